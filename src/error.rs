@@ -1,0 +1,63 @@
+//! What can go wrong, and where.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// The result of everything here that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong. The message names the file, the place, what was found and what was expected.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused to open, read, write or rename a file.
+    #[error("{}: {action}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was being done: "cannot open", "cannot read", …
+        action: &'static str,
+        /// The operating system's word.
+        source: std::io::Error,
+    },
+    /// A file is not what its format asks for.
+    #[error("{}{place}: {found}; expected {expected}", file.display())]
+    Parse {
+        /// The file (`<stdin>` for standard input).
+        file: PathBuf,
+        /// Where in the file.
+        place: Place,
+        /// What stands there.
+        found: String,
+        /// What should stand there, or what to do.
+        expected: String,
+    },
+    /// A list of positions and triangles is not a mesh.
+    #[error("{0}")]
+    InvalidMesh(String),
+    /// Options that contradict each other or lie outside their range.
+    #[error("{0}")]
+    InvalidOptions(String),
+}
+
+/// A place in a file. Written right behind the file's name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Place {
+    /// The file as a whole.
+    File,
+    /// A line, counted from 1.
+    Line(usize),
+    /// A byte offset, counted from 0.
+    Byte(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::File => Ok(()),
+            Place::Line(line) => write!(f, ":{line}"),
+            Place::Byte(byte) => write!(f, ": byte {byte}"),
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! The one type handed between the stages: positions and the triangles that index them.
+
+use glam::{DVec3, Vec3};
+
+use crate::error::{Error, Result};
+
+/// The most triangles that three directed edges each can number with 31 bits.
+pub const MAX_TRIANGLES: usize = (i32::MAX as usize) / 3;
+/// The most vertices that a 31-bit id can number.
+pub const MAX_VERTICES: usize = i32::MAX as usize;
+
+/// A triangle mesh as positions and triangles that index them (the paper's *shared vertex* form).
+///
+/// Positions are `f32`, relative to one `f64` [`origin`](Self::origin): zero for every mesh whose
+/// file holds floats or that lies near zero, so that its exact bits pass through, and a point near
+/// the mesh for one that lies far away (georeferenced scans), so that it keeps its precision.
+///
+/// Indices are validated here, once, and trusted after that. Anything else (non-manifold edges,
+/// degenerate or duplicate triangles, coordinates that are not finite) is input, not an error.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct IndexedMesh {
+    origin: DVec3,
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    double_sided: Vec<bool>,
+}
+
+impl IndexedMesh {
+    /// A mesh from single-precision positions and triangles, with its origin at zero.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] where a triangle names a vertex that is not there, or there are more
+    /// than 2³¹−1 vertices or directed edges.
+    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
+        Self::with_origin(DVec3::ZERO, positions, triangles)
+    }
+
+    /// A mesh whose positions are relative to `origin`.
+    ///
+    /// # Errors
+    /// As [`IndexedMesh::new`].
+    pub fn with_origin(
+        origin: DVec3,
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self> {
+        check_sizes(positions.len(), triangles.len())?;
+        let n = positions.len();
+        let outside = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= n);
+        if let Some(i) = triangles.iter().position(outside) {
+            let [a, b, c] = triangles[i];
+            return Err(Error::InvalidMesh(format!(
+                "triangle {i} uses vertices {a}, {b}, {c}; the mesh has {n} (counted from 0)"
+            )));
+        }
+        Ok(Self {
+            origin,
+            positions,
+            triangles,
+            double_sided: Vec::new(),
+        })
+    }
+
+    /// The point that [`positions`](Self::positions) are relative to.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// The vertices, relative to [`origin`](Self::origin).
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The triangles, three vertex indices each, counter-clockwise seen from outside. A folded
+    /// double-sided pair stands here once; see [`sides`](Self::sides).
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Whether triangle `i` stands for itself and its opposite (a folded double-sided sheet).
+    pub fn is_double_sided(&self, i: usize) -> bool {
+        self.double_sided.get(i).copied().unwrap_or(false)
+    }
+
+    /// One flag a triangle, or nothing where no triangle is double-sided.
+    pub fn double_sided(&self) -> &[bool] {
+        &self.double_sided
+    }
+
+    /// Marks triangles as double-sided: one flag a triangle, or an empty list for none.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] where the list is neither empty nor as long as the triangles.
+    pub fn with_double_sided(mut self, double_sided: Vec<bool>) -> Result<Self> {
+        if !double_sided.is_empty() && double_sided.len() != self.triangles.len() {
+            return Err(Error::InvalidMesh(format!(
+                "{} double-sided flags for {} triangles",
+                double_sided.len(),
+                self.triangles.len()
+            )));
+        }
+        self.double_sided = if double_sided.contains(&true) {
+            double_sided
+        } else {
+            Vec::new()
+        };
+        Ok(self)
+    }
+
+    /// The number of triangles a file of this mesh holds: double-sided ones count as two.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len() + self.double_sided.iter().filter(|&&d| d).count()
+    }
+
+    /// The triangles as a file holds them: behind each double-sided one stands its opposite.
+    pub fn sides(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.triangles
+            .iter()
+            .enumerate()
+            .flat_map(|(i, &[a, b, c])| {
+                let back = self.is_double_sided(i).then_some([a, c, b]);
+                std::iter::once([a, b, c]).chain(back)
+            })
+    }
+
+    /// The vertices in the file's own coordinates.
+    pub fn points(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.positions.iter().map(|p| self.origin + p.as_dvec3())
+    }
+
+    /// The corners of the box around all finite positions, relative to [`origin`](Self::origin).
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        bounds(self.positions.iter().map(|p| p.as_dvec3()))
+            .map(|(min, max)| (min.as_vec3(), max.as_vec3()))
+    }
+
+    /// The diagonal of the box around all finite positions, in model units; 0 without any.
+    pub fn diagonal(&self) -> f64 {
+        self.bounds()
+            .map_or(0.0, |(min, max)| (max.as_dvec3() - min.as_dvec3()).length())
+    }
+
+    /// The mesh taken apart: origin, positions, triangles, double-sided flags.
+    pub fn into_parts(self) -> (DVec3, Vec<Vec3>, Vec<[u32; 3]>, Vec<bool>) {
+        (
+            self.origin,
+            self.positions,
+            self.triangles,
+            self.double_sided,
+        )
+    }
+
+    /// The bytes that the arrays hold.
+    pub fn bytes(&self) -> usize {
+        self.positions.capacity() * size_of::<Vec3>()
+            + self.triangles.capacity() * size_of::<[u32; 3]>()
+            + self.double_sided.capacity()
+    }
+}
+
+fn check_sizes(vertices: usize, triangles: usize) -> Result<()> {
+    if triangles > MAX_TRIANGLES {
+        return Err(Error::InvalidMesh(format!(
+            "{triangles} triangles have more than 2^31-1 directed edges; at most {MAX_TRIANGLES} fit"
+        )));
+    }
+    if vertices > MAX_VERTICES {
+        return Err(Error::InvalidMesh(format!(
+            "{vertices} vertices; at most {MAX_VERTICES} can be numbered"
+        )));
+    }
+    Ok(())
+}
+
+fn bounds(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
+    points.filter(|p| p.is_finite()).fold(None, |bounds, p| {
+        let (min, max) = bounds.unwrap_or((p, p));
+        Some((min.min(p), max.max(p)))
+    })
+}
+
+/// Takes a mesh in element by element, as a reader finds it.
+///
+/// Keeps single precision as long as every coordinate is a single-precision number, and doubles
+/// from the first one that is not, until [`finish`](Self::finish) has chosen the origin.
+#[derive(Debug, Default)]
+pub struct MeshBuilder {
+    singles: Vec<Vec3>,
+    doubles: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// How many times farther from zero than its own size a mesh of doubles must lie before it gets an
+/// origin of its own: below, single precision keeps 20 bits of its size, finer than any scanner.
+const FAR: f64 = 16.0;
+
+impl MeshBuilder {
+    /// Adds a vertex with single-precision coordinates and returns its index.
+    pub fn push_single(&mut self, position: [f32; 3]) -> usize {
+        if self.doubles.is_empty() {
+            self.singles.push(position.into());
+            self.singles.len() - 1
+        } else {
+            self.push_double(position.map(f64::from))
+        }
+    }
+
+    /// Adds a vertex with double-precision coordinates and returns its index.
+    pub fn push_double(&mut self, position: [f64; 3]) -> usize {
+        let exact = |x: f64| f64::from(x as f32) == x || x.is_nan();
+        if self.doubles.is_empty() {
+            if position.into_iter().all(exact) {
+                return self.push_single(position.map(|x| x as f32));
+            }
+            let singles = std::mem::take(&mut self.singles);
+            self.doubles = singles.into_iter().map(Vec3::as_dvec3).collect();
+        }
+        self.doubles.push(position.into());
+        self.doubles.len() - 1
+    }
+
+    /// Adds a triangle. Its indices are checked by [`finish`](Self::finish); a reader that can name
+    /// the place in its file checks them before.
+    pub fn push_triangle(&mut self, triangle: [u32; 3]) {
+        self.triangles.push(triangle);
+    }
+
+    /// Adds a polygon as the fan of triangles around its first corner.
+    pub fn push_polygon(&mut self, corners: &[u32]) {
+        if let [first, rest @ ..] = corners {
+            for pair in rest.windows(2) {
+                self.triangles.push([*first, pair[0], pair[1]]);
+            }
+        }
+    }
+
+    /// The vertices so far.
+    pub fn vertex_count(&self) -> usize {
+        self.singles.len().max(self.doubles.len())
+    }
+
+    /// The triangles so far.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// The mesh, with the origin that its coordinates ask for.
+    ///
+    /// # Errors
+    /// As [`IndexedMesh::new`].
+    pub fn finish(mut self) -> Result<IndexedMesh> {
+        check_sizes(self.vertex_count(), self.triangles.len())?;
+        self.triangles.shrink_to_fit();
+        if self.doubles.is_empty() {
+            self.singles.shrink_to_fit();
+            return IndexedMesh::new(self.singles, self.triangles);
+        }
+        let origin = origin_for(&self.doubles);
+        let positions = self
+            .doubles
+            .iter()
+            .map(|&p| (p - origin).as_vec3())
+            .collect();
+        IndexedMesh::with_origin(origin, positions, self.triangles)
+    }
+}
+
+/// Zero, or a point near the middle of a mesh that lies far from zero, on a grid as coarse as the
+/// mesh is large, so that subtracting it loses no bit of a coordinate.
+fn origin_for(points: &[DVec3]) -> DVec3 {
+    let Some((min, max)) = bounds(points.iter().copied()) else {
+        return DVec3::ZERO;
+    };
+    let size = (max - min).max_element();
+    let farthest = min.abs().max(max.abs()).max_element();
+    if farthest <= FAR * size || !size.is_finite() {
+        return DVec3::ZERO;
+    }
+    // The smallest power of two at or above the size, by its exponent bits; 1 for a single point.
+    let grid = if size > 0.0 {
+        f64::from_bits((size.to_bits() >> 52) + 1 << 52)
+    } else {
+        1.0
+    };
+    let middle = min + (max - min) * 0.5;
+    let origin = (middle / grid).round() * grid;
+    if origin.is_finite() {
+        origin
+    } else {
+        DVec3::ZERO
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A float file's coordinates keep their bits, also far from zero.
+    #[test]
+    fn singles_keep_their_bits() {
+        let mut builder = MeshBuilder::default();
+        let far = [1.0e7_f32, 0.1, -0.0];
+        for _ in 0..3 {
+            builder.push_double(far.map(f64::from));
+        }
+        builder.push_triangle([0, 1, 2]);
+        let mesh = builder.finish().unwrap();
+        assert_eq!(mesh.origin(), DVec3::ZERO);
+        assert_eq!(
+            mesh.positions()[2].to_array().map(f32::to_bits),
+            far.map(f32::to_bits)
+        );
+    }
+
+    /// Doubles a million sizes away from zero keep millimetres: single precision alone has a grid
+    /// of half a unit there.
+    #[test]
+    fn far_doubles_get_an_origin() {
+        let mut builder = MeshBuilder::default();
+        let points = [
+            [5.0e6, 4.0e5, 0.1],
+            [5.0e6 + 0.001, 4.0e5, 0.1],
+            [5.0e6, 4.0e5 + 0.7, 0.1],
+        ];
+        for p in points {
+            builder.push_double(p);
+        }
+        builder.push_triangle([0, 1, 2]);
+        let mesh = builder.finish().unwrap();
+        assert_ne!(mesh.origin(), DVec3::ZERO);
+        for (p, q) in mesh.points().zip(points) {
+            assert!((p - DVec3::from(q)).length() < 1e-7, "{p} is not {q:?}");
+        }
+    }
+
+    #[test]
+    fn an_index_past_the_end_is_an_error() {
+        let error = IndexedMesh::new(vec![Vec3::ZERO; 3], vec![[0, 1, 3]]).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("triangle 0 uses vertices 0, 1, 3"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn double_sided_triangles_count_and_come_out_twice() {
+        let mesh = IndexedMesh::new(vec![Vec3::ZERO; 4], vec![[0, 1, 2], [0, 2, 3]])
+            .unwrap()
+            .with_double_sided(vec![true, false])
+            .unwrap();
+        assert_eq!(mesh.triangle_count(), 3);
+        let sides: Vec<_> = mesh.sides().collect();
+        assert_eq!(sides, [[0, 1, 2], [0, 2, 1], [0, 2, 3]]);
+    }
+}

@@ -1,0 +1,170 @@
+//! Mesh files: a path becomes an [`IndexedMesh`], and an [`IndexedMesh`] becomes a file.
+//!
+//! | format | read | written |
+//! |---|---|---|
+//! | PLY | ASCII, binary of both byte orders; polygons, triangle strips | binary little-endian, ASCII |
+//! | OBJ | `v` and `f` lines; groups and objects are one mesh | text |
+//! | STL | binary, ASCII; every facet has three vertices of its own | binary, ASCII |
+//! | OFF | OFF, COFF, NOFF, CNOFF, STOFF as text | text |
+//!
+//! Files are read in blocks, from standard input as from disk. What a header promises never sizes
+//! an allocation; what is not connectivity or position is skipped.
+
+mod input;
+mod obj;
+mod off;
+mod output;
+mod ply;
+mod stl;
+mod text;
+
+use std::fmt;
+use std::io::Write;
+use std::path::Path;
+use std::str::FromStr;
+
+use crate::error::{Error, Result};
+use crate::indexed_mesh::IndexedMesh;
+
+use input::Input;
+
+/// A mesh file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
+#[non_exhaustive]
+pub enum Format {
+    /// Stanford polygon format.
+    Ply,
+    /// Wavefront object.
+    Obj,
+    /// Stereolithography.
+    Stl,
+    /// Object file format (Geomview).
+    Off,
+}
+
+impl Format {
+    /// Every format, in the order in which messages list them.
+    pub const ALL: [Format; 4] = [Format::Ply, Format::Obj, Format::Stl, Format::Off];
+
+    /// The usual file name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Ply => "ply",
+            Format::Obj => "obj",
+            Format::Stl => "stl",
+            Format::Off => "off",
+        }
+    }
+
+    /// The format that a path's extension names, in any letter case.
+    pub fn from_extension(path: &Path) -> Option<Format> {
+        path.extension()?.to_str()?.parse().ok()
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.extension())
+    }
+}
+
+impl FromStr for Format {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Format::ALL
+            .into_iter()
+            .find(|format| name.eq_ignore_ascii_case(format.extension()))
+            .ok_or_else(|| {
+                Error::InvalidOptions(format!("no format '{name}'; expected {KNOWN_FORMATS}"))
+            })
+    }
+}
+
+/// What messages list where a format is none of ours.
+const KNOWN_FORMATS: &str = "ply, obj, stl or off";
+
+/// How a mesh is written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// The format, or `None` for the one that the path's extension names.
+    pub format: Option<Format>,
+    /// Text where the format has both (PLY, STL).
+    pub ascii: bool,
+    /// Significant decimal digits of a coordinate in text, 1 to 17; `None` for as many as it takes
+    /// to read back the same bits.
+    pub precision: Option<usize>,
+}
+
+/// Reads a mesh from `path`, or from standard input where `path` is `-`.
+///
+/// Without a `format` the content decides where it is unmistakable (PLY's and OFF's first word, the
+/// length of a binary STL, `solid` … `facet`), and the extension otherwise. A file without faces
+/// is a mesh without triangles, not an error.
+///
+/// # Errors
+/// [`Error::Io`] where the file cannot be read, [`Error::Parse`] where its content is not what its
+/// format asks for, with the line or byte.
+pub fn read(path: &Path, format: Option<Format>) -> Result<IndexedMesh> {
+    let input = if path == Path::new("-") { Input::stdin() } else { Input::open(path) }?;
+    let format = match format {
+        Some(format) => format,
+        None => input.detect_format()?,
+    };
+    input.refuse_stand_ins()?;
+    match format {
+        Format::Ply => ply::read(input),
+        Format::Obj => obj::read(input),
+        Format::Stl => stl::read(input),
+        Format::Off => off::read(input),
+    }
+}
+
+/// Writes a mesh to `path`, or to standard output where `path` is `-`.
+///
+/// A file appears whole or not at all: it is written under another name beside its place and
+/// renamed when it is complete. What is there already and no regular file (a device, a pipe) is
+/// written to directly.
+///
+/// # Errors
+/// [`Error::InvalidOptions`] where no format is given or named by the extension, or the precision
+/// is out of range; [`Error::Io`] where writing fails.
+pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<()> {
+    let format = match options.format {
+        Some(format) => format,
+        None if path == Path::new("-") => {
+            return Err(Error::InvalidOptions(format!(
+                "standard output has no extension to tell the format; give --output-format \
+                 {KNOWN_FORMATS}"
+            )));
+        }
+        None => Format::from_extension(path).ok_or_else(|| {
+            Error::InvalidOptions(format!(
+                "{}: cannot tell the format to write from the extension; expected {KNOWN_FORMATS}, \
+                 or --output-format",
+                path.display()
+            ))
+        })?,
+    };
+    if options.precision.is_some_and(|digits| !(1..=17).contains(&digits)) {
+        return Err(Error::InvalidOptions("precision is 1 to 17 significant digits".into()));
+    }
+    output::write_file(path, |mut writer| write_to(&mut writer, mesh, format, options))
+}
+
+/// Writes a mesh in `format`.
+fn write_to(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    format: Format,
+    options: &WriteOptions,
+) -> std::io::Result<()> {
+    match format {
+        Format::Ply if options.ascii => output::ply_ascii(writer, mesh, options.precision),
+        Format::Ply => output::ply_binary(writer, mesh),
+        Format::Obj => output::obj(writer, mesh, options.precision),
+        Format::Stl if options.ascii => output::stl_ascii(writer, mesh, options.precision),
+        Format::Stl => output::stl_binary(writer, mesh),
+        Format::Off => output::off(writer, mesh, options.precision),
+    }
+}

@@ -1,0 +1,273 @@
+//! Lines, words and numbers of the text formats.
+
+use std::io::{BufRead, BufReader, Read};
+
+use crate::error::{Error, Place, Result};
+
+use super::input::Input;
+
+/// The longest piece of a file that a message repeats, in characters.
+const QUOTE_CHARS: usize = 40;
+
+/// The lines of a text file, one at a time in one buffer.
+///
+/// Ends lines at `\n`, `\r\n` and `\r`, takes any 8-bit encoding, and decodes UTF-16 behind a byte
+/// order mark (all but ASCII becomes `?`: only names are written in it).
+pub(super) struct Lines {
+    input: Input,
+    line: Vec<u8>,
+    first: usize,
+    last: usize,
+    ended_with_cr: bool,
+}
+
+impl Lines {
+    /// The lines of a whole file.
+    pub fn new(mut input: Input) -> Result<Self> {
+        let bom_bytes = match input.head.as_slice() {
+            [0xFE, 0xFF, ..] | [0xFF, 0xFE, ..] => 2,
+            [0xEF, 0xBB, 0xBF, ..] => 3,
+            _ => 0,
+        };
+        let mut bom = [0; 3];
+        if let Err(source) = input.reader.read_exact(&mut bom[..bom_bytes]) {
+            return Err(input.io_error(source));
+        }
+        if bom_bytes == 2 {
+            let utf16 = Utf16 { reader: input.reader, big_endian: bom[0] == 0xFE };
+            input.reader = BufReader::new(Box::new(utf16));
+        }
+        Ok(Self::after(input, 0))
+    }
+
+    /// The lines that follow where `read` of them have been read already.
+    pub fn after(input: Input, read: usize) -> Self {
+        Lines { input, line: Vec::new(), first: read, last: read, ended_with_cr: false }
+    }
+
+    /// Goes to the next line. `false` at the end of the file.
+    pub fn advance(&mut self) -> Result<bool> {
+        self.line.clear();
+        self.first = self.last + 1;
+        self.append()
+    }
+
+    /// Goes to the next line, joined with those behind it as long as `\` ends them.
+    pub fn advance_continued(&mut self) -> Result<bool> {
+        if !self.advance()? {
+            return Ok(false);
+        }
+        while let [start @ .., b'\\'] = self.line.as_slice() {
+            let length = start.len();
+            self.line.truncate(length);
+            self.line.push(b' ');
+            if !self.append()? {
+                break;
+            }
+        }
+        Ok(true)
+    }
+
+    fn append(&mut self) -> Result<bool> {
+        let mut any = false;
+        loop {
+            let chunk = match self.input.reader.fill_buf() {
+                Ok(chunk) => chunk,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
+                Err(e) => return Err(self.input.io_error(e)),
+            };
+            if std::mem::take(&mut self.ended_with_cr) && chunk.first() == Some(&b'\n') {
+                self.input.reader.consume(1);
+                continue;
+            }
+            if chunk.is_empty() {
+                self.last += usize::from(any);
+                return Ok(any);
+            }
+            any = true;
+            match chunk.iter().position(|&b| b == b'\n' || b == b'\r') {
+                Some(end) => {
+                    self.line.extend_from_slice(&chunk[..end]);
+                    self.ended_with_cr = chunk[end] == b'\r';
+                    self.input.reader.consume(end + 1);
+                    self.last += 1;
+                    return Ok(true);
+                }
+                None => {
+                    let length = chunk.len();
+                    self.line.extend_from_slice(chunk);
+                    self.input.reader.consume(length);
+                }
+            }
+        }
+    }
+
+    /// The current line without its end.
+    pub fn line(&self) -> &[u8] {
+        &self.line
+    }
+
+    /// The words of the current line up to a `#`.
+    pub fn words(&self) -> impl Iterator<Item = &[u8]> {
+        words(before_comment(&self.line))
+    }
+
+    /// The number of the current line, counted from 1; of its first where several are joined.
+    pub fn number(&self) -> usize {
+        self.first
+    }
+
+    /// A parse error in the current line.
+    pub fn error(&self, found: &str, expected: &str) -> Error {
+        self.error_at(self.first, found, expected)
+    }
+
+    /// A parse error in another line.
+    pub fn error_at(&self, line: usize, found: &str, expected: &str) -> Error {
+        self.input.error(Place::Line(line), found, expected)
+    }
+
+    /// A parse error where lines are missing.
+    pub fn error_at_end(&self, found: &str, expected: &str) -> Error {
+        self.error_at(self.last, found, expected)
+    }
+
+    /// A parse error about the file as a whole.
+    pub fn error_in_file(&self, found: &str, expected: &str) -> Error {
+        self.input.error(Place::File, found, expected)
+    }
+}
+
+/// UTF-16 without its byte order mark, read as ASCII with `?` for everything else.
+struct Utf16 {
+    reader: BufReader<Box<dyn Read>>,
+    big_endian: bool,
+}
+
+impl Read for Utf16 {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            let mut pair = [0; 2];
+            match self.reader.read_exact(&mut pair) {
+                Ok(()) => {}
+                Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => break,
+                Err(e) => return Err(e),
+            }
+            let unit = if self.big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
+            buffer[filled] = u8::try_from(unit).ok().filter(u8::is_ascii).unwrap_or(b'?');
+            filled += 1;
+        }
+        Ok(filled)
+    }
+}
+
+/// The words of a line, whatever blanks stand between them.
+pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// A line up to its `#`.
+pub(super) fn before_comment(line: &[u8]) -> &[u8] {
+    line.split(|&b| b == b'#').next().unwrap_or_default()
+}
+
+/// A piece of a file as a message repeats it: in quotes, shortened, on one line.
+pub(super) fn quote(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * QUOTE_CHARS)]);
+    let clean: String = text
+        .trim()
+        .chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .take(QUOTE_CHARS)
+        .collect();
+    if clean.len() < text.trim().len() { format!("'{clean}…'") } else { format!("'{clean}'") }
+}
+
+/// A number that need not be finite: besides Rust's spellings those of C on Windows
+/// (`1.#IND`, `-1.#INF`, `-nan(ind)`).
+pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(word).ok()?;
+    text.parse().ok().or_else(|| not_finite(text))
+}
+
+/// The value of a spelling of NaN or infinity that Rust does not know.
+pub(super) fn not_finite(text: &str) -> Option<f64> {
+    let (sign, magnitude) = match text.strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let magnitude = magnitude.to_ascii_lowercase();
+    if magnitude.starts_with("1.#inf") {
+        Some(sign * f64::INFINITY)
+    } else if ["1.#ind", "1.#qnan", "1.#snan", "nan("].iter().any(|s| magnitude.starts_with(s)) {
+        Some(f64::NAN)
+    } else {
+        None
+    }
+}
+
+/// A whole number.
+pub(super) fn parse_integer(word: &[u8]) -> Option<i64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// `1 vertex`, `2 vertices`.
+pub(super) fn count(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(bytes: impl Into<Vec<u8>>) -> Vec<(usize, String)> {
+        let mut lines = Lines::new(Input::from_stream("a", bytes).unwrap()).unwrap();
+        let mut found = Vec::new();
+        while lines.advance_continued().unwrap() {
+            found.push((lines.number(), String::from_utf8_lossy(lines.line()).into_owned()));
+        }
+        found
+    }
+
+    #[test]
+    fn every_line_end_ends_a_line() {
+        let expected = ["a", "", "b", "c", "d"].map(String::from);
+        for text in ["a\n\nb\nc\nd", "a\r\n\r\nb\r\nc\r\nd\r\n", "a\r\rb\rc\rd\r"] {
+            let found = lines(text);
+            assert_eq!(found.iter().map(|(_, line)| line.clone()).collect::<Vec<_>>(), expected);
+            assert_eq!(found.iter().map(|&(n, _)| n).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
+        }
+    }
+
+    #[test]
+    fn a_backslash_joins_lines_and_keeps_their_count() {
+        assert_eq!(lines("a \\\nb\\\r\nc\nd\\"), [
+            (1, "a  b c".to_string()),
+            (4, "d ".to_string())
+        ]);
+    }
+
+    #[test]
+    fn utf16_reads_as_ascii() {
+        let text = "v 1\nö\n";
+        let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let little: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let expected = [(1, "v 1".to_string()), (2, "?".to_string())];
+        assert_eq!(lines([vec![0xFE, 0xFF], big].concat()), expected);
+        assert_eq!(lines([vec![0xFF, 0xFE], little].concat()), expected);
+    }
+
+    #[test]
+    fn numbers_in_every_spelling() {
+        for (text, value) in [("1", 1.0), ("+2.", 2.0), ("-.5e1", -5.0), ("1.#INF", f64::INFINITY)] {
+            assert_eq!(parse_number(text.as_bytes()), Some(value), "{text}");
+        }
+        for text in ["nan", "-NaN", "1.#IND", "-1.#QNAN", "-nan(ind)"] {
+            assert!(parse_number(text.as_bytes()).is_some_and(f64::is_nan), "{text}");
+        }
+        for text in ["", "x", "1,5", "3.1+e2", "1.#", "0x10"] {
+            assert_eq!(parse_number(text.as_bytes()), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,5 @@
+pub mod error;
+pub mod indexed_mesh;
+pub mod mesh;
+#[cfg(test)]
+mod shapes;
