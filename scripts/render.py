@@ -3,24 +3,20 @@
 
     render.py full.ply small.ply -o out.png --titles "100 %" "10 %" --edges
 
-Reads OBJ, OFF, PLY (text or binary, faces or triangle strips) and STL. Draws off screen: the vtk wheels fall back to
-OSMesa, which they bring along, so neither a display nor a GPU is needed. Where an older wheel asks for libGL, install
-`libgl1` and `xvfb` and run the script under `xvfb-run -a`.
+Reads OBJ, OFF, PLY (text or binary, faces or triangle strips) and STL. Draws off screen, without display or GPU: VTK
+falls back to EGL after a warning about the X server. On a bare Debian or Ubuntu: `apt-get install libgl1 libegl1`;
+where EGL fails too, `apt-get install xvfb` and `xvfb-run -a` before the command.
 """
 import argparse
-import os
 import pathlib
 import struct
 import sys
 
 import numpy as np
-
-# Without a display ask for OSMesa at once; VTK would find it too, after a warning. Must precede the import.
-if not os.environ.get("DISPLAY") and sys.platform.startswith("linux"):
-    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
 import pyvista
 from PIL import Image
 
+MAX_TRIANGLES_WITH_EDGES = 30_000  # in a view 500 pixels wide more are one dark surface
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
          "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
          "float32": "f4", "float64": "f8"}
@@ -162,7 +158,7 @@ def main():
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True, metavar="OUT.png")
     parser.add_argument("--columns", type=int, help="default: all in one row")
     parser.add_argument("--titles", nargs="+", help="one for each mesh; default: its count of triangles")
-    parser.add_argument("--edges", action="store_true", help="draw the edges of the triangles")
+    parser.add_argument("--edges", action="store_true", help="draw the edges of meshes that are not too fine for it")
     parser.add_argument("--width", type=int, default=1500, help="of the image, in pixels (default 1500)")
     parser.add_argument("--aspect", type=float, default=0.72, help="height of a view over its width (default 0.72)")
     parser.add_argument("--view", nargs=3, type=float, default=(-0.35, -1.0, 0.3), metavar=("X", "Y", "Z"),
@@ -188,8 +184,9 @@ def main():
     for k, (mesh, title) in enumerate(zip(meshes, titles)):
         plotter.subplot(k // columns, k % columns)
         plotter.set_background("white")
-        plotter.add_mesh(mesh, color=options.color, smooth_shading=False, show_edges=options.edges,
-                         edge_color="#4a4036", line_width=0.6, ambient=0.12, diffuse=1.0, specular=0.0)
+        edges = options.edges and mesh.n_cells <= MAX_TRIANGLES_WITH_EDGES
+        plotter.add_mesh(mesh, color=options.color, smooth_shading=False, show_edges=edges,
+                         edge_color="#4a4036", edge_opacity=0.6, line_width=0.6, ambient=0.12, diffuse=1.0, specular=0.0)
         plotter.add_text(title, position="lower_edge", font_size=11, color="#333333")
         camera = plotter.camera
         camera.focal_point, camera.position = centre, centre + direction * diagonal * 2.0

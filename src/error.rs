@@ -35,6 +35,22 @@ pub enum Error {
     /// A list of positions and triangles is not a mesh.
     #[error("{0}")]
     InvalidMesh(String),
+    /// A memory limit that no tier can keep.
+    #[error(
+        "the memory limit of {:.1} MB is too low: the {tier} tier needs {:.1} MB",
+        *limit_bytes as f64 / 1e6, *needed_bytes as f64 / 1e6
+    )]
+    Memory {
+        /// The tier that needs least, or the one asked for.
+        tier: &'static str,
+        /// What it needs.
+        needed_bytes: u64,
+        /// What it may use.
+        limit_bytes: u64,
+    },
+    /// A mistake of this library's own, found by a check that was asked for.
+    #[error("internal error: {0}; please report it with the mesh")]
+    Internal(String),
     /// Options that contradict each other or lie outside their range.
     #[error("{0}")]
     InvalidOptions(String),

@@ -28,8 +28,13 @@ pub(super) struct Input {
 impl Input {
     /// Opens a file.
     pub fn open(path: &Path) -> Result<Self> {
-        let cannot =
-            |action| move |source| Error::Io { path: path.to_path_buf(), action, source };
+        let cannot = |action| {
+            move |source| Error::Io {
+                path: path.to_path_buf(),
+                action,
+                source,
+            }
+        };
         let file = File::open(path).map_err(cannot("cannot open"))?;
         let metadata = file.metadata().map_err(cannot("cannot open"))?;
         let length = metadata.is_file().then_some(metadata.len());
@@ -45,11 +50,20 @@ impl Input {
     pub fn new(file: PathBuf, mut source: Box<dyn Read>, length: Option<u64>) -> Result<Self> {
         let mut head = Vec::new();
         if let Err(source) = (&mut source).take(HEAD_BYTES).read_to_end(&mut head) {
-            return Err(Error::Io { path: file, action: "cannot read", source });
+            return Err(Error::Io {
+                path: file,
+                action: "cannot read",
+                source,
+            });
         }
         let whole: Box<dyn Read> = Box::new(Cursor::new(head.clone()).chain(source));
         let reader = BufReader::with_capacity(BLOCK_BYTES, whole);
-        let input = Input { file, reader, head, length };
+        let input = Input {
+            file,
+            reader,
+            head,
+            length,
+        };
         if input.head.is_empty() {
             return Err(input.error(Place::File, "the file is empty", "a mesh"));
         }
@@ -58,7 +72,6 @@ impl Input {
 
     /// The format, by content where that is unmistakable, else by extension.
     pub fn detect_format(&self) -> Result<Format> {
-        self.refuse_stand_ins()?;
         if let Some(format) = self.format_by_content() {
             return Ok(format);
         }
@@ -87,7 +100,11 @@ impl Input {
 
     /// An error for what often lies where a mesh is expected and is none that we read.
     pub fn refuse_stand_ins(&self) -> Result<()> {
-        let extension = self.file.extension().unwrap_or_default().to_ascii_lowercase();
+        let extension = self
+            .file
+            .extension()
+            .unwrap_or_default()
+            .to_ascii_lowercase();
         if self.head.starts_with(b"version https://git-lfs") {
             let found = "this is a git-lfs pointer, not the mesh";
             return Err(self.error(Place::File, found, "the mesh itself (run `git lfs pull`)"));
@@ -110,7 +127,11 @@ impl Input {
 
     /// A read error in this file.
     pub fn io_error(&self, source: std::io::Error) -> Error {
-        Error::Io { path: self.file.clone(), action: "cannot read", source }
+        Error::Io {
+            path: self.file.clone(),
+            action: "cannot read",
+            source,
+        }
     }
 }
 
@@ -132,7 +153,11 @@ impl Input {
                 self.0.read(&mut buffer[..n])
             }
         }
-        Self::new(name.into(), Box::new(Trickle(Cursor::new(bytes.into()))), None)
+        Self::new(
+            name.into(),
+            Box::new(Trickle(Cursor::new(bytes.into()))),
+            None,
+        )
     }
 }
 
@@ -146,9 +171,18 @@ mod tests {
 
     #[test]
     fn content_wins_over_the_extension() {
-        assert_eq!(detect("a.stl", b"ply\nformat ascii 1.0\n").unwrap(), Format::Ply);
-        assert_eq!(detect("a.obj", b"# a cube\nOFF\n8 6 12\n").unwrap(), Format::Off);
-        assert_eq!(detect("a.ply", b"solid x\n facet normal 0 0 1\n").unwrap(), Format::Stl);
+        assert_eq!(
+            detect("a.stl", b"ply\nformat ascii 1.0\n").unwrap(),
+            Format::Ply
+        );
+        assert_eq!(
+            detect("a.obj", b"# a cube\nOFF\n8 6 12\n").unwrap(),
+            Format::Off
+        );
+        assert_eq!(
+            detect("a.ply", b"solid x\n facet normal 0 0 1\n").unwrap(),
+            Format::Stl
+        );
         let mut binary = vec![b'x'; 84 + 50];
         binary[80..84].copy_from_slice(&1u32.to_le_bytes());
         assert_eq!(detect("a.obj", &binary).unwrap(), Format::Stl);
@@ -166,7 +200,14 @@ mod tests {
     fn a_stream_is_told_by_its_first_bytes() {
         let stream = Input::from_stream("<stdin>", *b"OFF 1 1 1\n").unwrap();
         assert_eq!(stream.detect_format().unwrap(), Format::Off);
-        let error = Input::from_stream("<stdin>", *b"v 0 0 0\n").unwrap().detect_format();
-        assert!(error.unwrap_err().to_string().ends_with("--input-format names it"));
+        let error = Input::from_stream("<stdin>", *b"v 0 0 0\n")
+            .unwrap()
+            .detect_format();
+        assert!(
+            error
+                .unwrap_err()
+                .to_string()
+                .ends_with("--input-format names it")
+        );
     }
 }

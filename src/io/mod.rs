@@ -15,6 +15,7 @@ mod obj;
 mod off;
 mod output;
 mod ply;
+mod ply_header;
 mod stl;
 mod text;
 
@@ -106,12 +107,16 @@ pub struct WriteOptions {
 /// [`Error::Io`] where the file cannot be read, [`Error::Parse`] where its content is not what its
 /// format asks for, with the line or byte.
 pub fn read(path: &Path, format: Option<Format>) -> Result<IndexedMesh> {
-    let input = if path == Path::new("-") { Input::stdin() } else { Input::open(path) }?;
+    let input = if path == Path::new("-") {
+        Input::stdin()
+    } else {
+        Input::open(path)
+    }?;
+    input.refuse_stand_ins()?;
     let format = match format {
         Some(format) => format,
         None => input.detect_format()?,
     };
-    input.refuse_stand_ins()?;
     match format {
         Format::Ply => ply::read(input),
         Format::Obj => obj::read(input),
@@ -146,10 +151,17 @@ pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<
             ))
         })?,
     };
-    if options.precision.is_some_and(|digits| !(1..=17).contains(&digits)) {
-        return Err(Error::InvalidOptions("precision is 1 to 17 significant digits".into()));
+    if options
+        .precision
+        .is_some_and(|digits| !(1..=17).contains(&digits))
+    {
+        return Err(Error::InvalidOptions(
+            "precision is 1 to 17 significant digits".into(),
+        ));
     }
-    output::write_file(path, |mut writer| write_to(&mut writer, mesh, format, options))
+    output::write_file(path, |mut writer| {
+        write_to(&mut writer, mesh, format, options)
+    })
 }
 
 /// Writes a mesh in `format`.

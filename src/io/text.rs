@@ -1,6 +1,6 @@
 //! Lines, words and numbers of the text formats.
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Write};
 
 use crate::error::{Error, Place, Result};
 
@@ -34,7 +34,10 @@ impl Lines {
             return Err(input.io_error(source));
         }
         if bom_bytes == 2 {
-            let utf16 = Utf16 { reader: input.reader, big_endian: bom[0] == 0xFE };
+            let utf16 = Utf16 {
+                reader: input.reader,
+                big_endian: bom[0] == 0xFE,
+            };
             input.reader = BufReader::new(Box::new(utf16));
         }
         Ok(Self::after(input, 0))
@@ -42,7 +45,13 @@ impl Lines {
 
     /// The lines that follow where `read` of them have been read already.
     pub fn after(input: Input, read: usize) -> Self {
-        Lines { input, line: Vec::new(), first: read, last: read, ended_with_cr: false }
+        Lines {
+            input,
+            line: Vec::new(),
+            first: read,
+            last: read,
+            ended_with_cr: false,
+        }
     }
 
     /// Goes to the next line. `false` at the end of the file.
@@ -73,7 +82,7 @@ impl Lines {
         loop {
             let chunk = match self.input.reader.fill_buf() {
                 Ok(chunk) => chunk,
-                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
                 Err(e) => return Err(self.input.io_error(e)),
             };
             if std::mem::take(&mut self.ended_with_cr) && chunk.first() == Some(&b'\n') {
@@ -107,9 +116,9 @@ impl Lines {
         &self.line
     }
 
-    /// The words of the current line up to a `#`.
+    /// The words of the current line before a comment.
     pub fn words(&self) -> impl Iterator<Item = &[u8]> {
-        words(before_comment(&self.line))
+        words_before_comment(&self.line)
     }
 
     /// The number of the current line, counted from 1; of its first where several are joined.
@@ -145,16 +154,20 @@ struct Utf16 {
 }
 
 impl Read for Utf16 {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut filled = 0;
         while filled < buffer.len() {
             let mut pair = [0; 2];
             match self.reader.read_exact(&mut pair) {
                 Ok(()) => {}
-                Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => break,
+                Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => break,
                 Err(e) => return Err(e),
             }
-            let unit = if self.big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
+            let unit = if self.big_endian {
+                u16::from_be_bytes(pair)
+            } else {
+                u16::from_le_bytes(pair)
+            };
             buffer[filled] = u8::try_from(unit).ok().filter(u8::is_ascii).unwrap_or(b'?');
             filled += 1;
         }
@@ -164,12 +177,13 @@ impl Read for Utf16 {
 
 /// The words of a line, whatever blanks stand between them.
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+    line.split(u8::is_ascii_whitespace)
+        .filter(|word| !word.is_empty())
 }
 
-/// A line up to its `#`.
-pub(super) fn before_comment(line: &[u8]) -> &[u8] {
-    line.split(|&b| b == b'#').next().unwrap_or_default()
+/// The words of a line up to one that begins with `#`; within a word (`1.#INF`) it is none.
+pub(super) fn words_before_comment(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    words(line).take_while(|word| word[0] != b'#')
 }
 
 /// A piece of a file as a message repeats it: in quotes, shortened, on one line.
@@ -181,7 +195,11 @@ pub(super) fn quote(bytes: &[u8]) -> String {
         .map(|c| if c.is_control() { ' ' } else { c })
         .take(QUOTE_CHARS)
         .collect();
-    if clean.len() < text.trim().len() { format!("'{clean}…'") } else { format!("'{clean}'") }
+    if clean.len() < text.trim().len() {
+        format!("'{clean}…'")
+    } else {
+        format!("'{clean}'")
+    }
 }
 
 /// A number that need not be finite: besides Rust's spellings those of C on Windows
@@ -200,7 +218,10 @@ pub(super) fn not_finite(text: &str) -> Option<f64> {
     let magnitude = magnitude.to_ascii_lowercase();
     if magnitude.starts_with("1.#inf") {
         Some(sign * f64::INFINITY)
-    } else if ["1.#ind", "1.#qnan", "1.#snan", "nan("].iter().any(|s| magnitude.starts_with(s)) {
+    } else if ["1.#ind", "1.#qnan", "1.#snan", "nan("]
+        .iter()
+        .any(|s| magnitude.starts_with(s))
+    {
         Some(f64::NAN)
     } else {
         None
@@ -217,6 +238,35 @@ pub(super) fn count(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
+/// Writes a coordinate: with all the digits that it takes to read back the same bits of an `f32`
+/// (`single`) or an `f64`, or with that many significant ones; with an exponent where the number
+/// is shorter for it.
+pub(super) fn write_number(
+    writer: &mut dyn Write,
+    x: f64,
+    single: bool,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    // Between these no exponent makes a number shorter by more than a character or two.
+    let plain = x == 0.0 || (1e-5..1e9).contains(&x.abs());
+    if let Some(digits) = digits {
+        let rounded: f64 = format!("{x:.*e}", digits.saturating_sub(1))
+            .parse()
+            .unwrap_or(x);
+        return if plain {
+            write!(writer, "{rounded}")
+        } else {
+            write!(writer, "{rounded:e}")
+        };
+    }
+    match (single, plain) {
+        (true, true) => write!(writer, "{}", x as f32),
+        (true, false) => write!(writer, "{:e}", x as f32),
+        (false, true) => write!(writer, "{x}"),
+        (false, false) => write!(writer, "{x:e}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -225,7 +275,10 @@ mod tests {
         let mut lines = Lines::new(Input::from_stream("a", bytes).unwrap()).unwrap();
         let mut found = Vec::new();
         while lines.advance_continued().unwrap() {
-            found.push((lines.number(), String::from_utf8_lossy(lines.line()).into_owned()));
+            found.push((
+                lines.number(),
+                String::from_utf8_lossy(lines.line()).into_owned(),
+            ));
         }
         found
     }
@@ -235,17 +288,26 @@ mod tests {
         let expected = ["a", "", "b", "c", "d"].map(String::from);
         for text in ["a\n\nb\nc\nd", "a\r\n\r\nb\r\nc\r\nd\r\n", "a\r\rb\rc\rd\r"] {
             let found = lines(text);
-            assert_eq!(found.iter().map(|(_, line)| line.clone()).collect::<Vec<_>>(), expected);
-            assert_eq!(found.iter().map(|&(n, _)| n).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
+            assert_eq!(
+                found
+                    .iter()
+                    .map(|(_, line)| line.clone())
+                    .collect::<Vec<_>>(),
+                expected
+            );
+            assert_eq!(
+                found.iter().map(|&(n, _)| n).collect::<Vec<_>>(),
+                [1, 2, 3, 4, 5]
+            );
         }
     }
 
     #[test]
     fn a_backslash_joins_lines_and_keeps_their_count() {
-        assert_eq!(lines("a \\\nb\\\r\nc\nd\\"), [
-            (1, "a  b c".to_string()),
-            (4, "d ".to_string())
-        ]);
+        assert_eq!(
+            lines("a \\\nb\\\r\nc\nd\\"),
+            [(1, "a  b c".to_string()), (4, "d ".to_string())]
+        );
     }
 
     #[test]
@@ -260,14 +322,43 @@ mod tests {
 
     #[test]
     fn numbers_in_every_spelling() {
-        for (text, value) in [("1", 1.0), ("+2.", 2.0), ("-.5e1", -5.0), ("1.#INF", f64::INFINITY)] {
+        for (text, value) in [
+            ("1", 1.0),
+            ("+2.", 2.0),
+            ("-.5e1", -5.0),
+            ("1.#INF", f64::INFINITY),
+        ] {
             assert_eq!(parse_number(text.as_bytes()), Some(value), "{text}");
         }
         for text in ["nan", "-NaN", "1.#IND", "-1.#QNAN", "-nan(ind)"] {
-            assert!(parse_number(text.as_bytes()).is_some_and(f64::is_nan), "{text}");
+            assert!(
+                parse_number(text.as_bytes()).is_some_and(f64::is_nan),
+                "{text}"
+            );
         }
         for text in ["", "x", "1,5", "3.1+e2", "1.#", "0x10"] {
             assert_eq!(parse_number(text.as_bytes()), None, "{text}");
         }
+    }
+
+    fn written(x: f64, single: bool, digits: Option<usize>) -> String {
+        let mut bytes = Vec::new();
+        write_number(&mut bytes, x, single, digits).unwrap();
+        String::from_utf8(bytes).unwrap()
+    }
+
+    #[test]
+    fn numbers_are_short_and_read_back() {
+        assert_eq!(written(f64::from(0.1_f32), true, None), "0.1");
+        assert_eq!(
+            written(f64::from(0.1_f32), false, None),
+            "0.10000000149011612"
+        );
+        assert_eq!(written(-0.0, true, None), "-0");
+        assert_eq!(written(1e-30, false, None), "1e-30");
+        assert_eq!(written(f64::from(f32::MAX), true, None), "3.4028235e38");
+        assert_eq!(written(1234.5678, false, Some(6)), "1234.57");
+        assert_eq!(written(1e-30 / 3.0, false, Some(3)), "3.33e-31");
+        assert_eq!(written(f64::NAN, true, None), "NaN");
     }
 }

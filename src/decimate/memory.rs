@@ -1,0 +1,141 @@
+//! How much memory there is, how much a tier needs, and so which to take.
+
+use super::options::{Options, TierChoice};
+use crate::error::{Error, Result};
+use crate::mesh::Tier;
+
+/// The most bytes that decimating a manifold mesh in a tier holds at once: the tier's words and
+/// positions; the triangles they are built from and the build's lists; then tensors, stamps,
+/// deviations and the queue.
+pub fn needed_bytes(tier: Tier, vertices: usize, triangles: usize) -> u64 {
+    let building = 12 * triangles + 15 * triangles + 4 * vertices;
+    let collapsing = 46 * vertices + 36 * triangles;
+    (tier.bytes(vertices, triangles) + building.max(collapsing)) as u64
+}
+
+/// The memory that could be taken now without swapping, in bytes: the system's, or less where a
+/// container limits it; without bound where the system does not say.
+pub fn available_bytes() -> u64 {
+    let Ok(mut system) = sysinfo::System::new() else {
+        return u64::MAX;
+    };
+    system.refresh_memory();
+    let limit = system
+        .cgroup_limits()
+        .map_or(u64::MAX, |limits| limits.free_memory);
+    system.available_memory().min(limit)
+}
+
+/// The most memory that this process has held at once, in bytes.
+///
+/// From the system's own high-water mark where it is readable without unsafe code (Linux);
+/// elsewhere the memory held now, which at the end of a run is a lower bound.
+pub fn peak_rss_bytes() -> Option<u64> {
+    let high_water_mark = || {
+        let status = std::fs::read_to_string("/proc/self/status").ok()?;
+        let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+        let kibibytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+        Some(kibibytes * 1024)
+    };
+    let held_now = || {
+        let id = sysinfo::get_current_pid().ok()?;
+        let mut system = sysinfo::System::new().ok()?;
+        system.refresh_processes(sysinfo::ProcessesToUpdate::Some(&[id]), false);
+        Some(system.process(id)?.memory())
+    };
+    high_water_mark().or_else(held_now)
+}
+
+/// The tier to use, and why.
+pub(super) fn choose_tier(
+    options: &Options,
+    vertices: usize,
+    triangles: usize,
+) -> Result<(Tier, String)> {
+    let tier = match options.tier {
+        TierChoice::Fixed(tier) => Some(tier),
+        TierChoice::Auto => None,
+    };
+    let needed = |tier| needed_bytes(tier, vertices, triangles);
+    if let (Some(tier), None) = (tier, options.memory_limit_bytes) {
+        return Ok((tier, "asked for".into()));
+    }
+    let (limit, whose) = match options.memory_limit_bytes {
+        Some(limit) => (limit, "the memory limit"),
+        None => (available_bytes(), "the memory that is free"),
+    };
+    let fits = |tier: &Tier| needed(*tier) <= limit;
+    let choices = tier.map_or(Tier::ALL.to_vec(), |tier| vec![tier]);
+    let explain = |tier| {
+        format!(
+            "{} needed, {whose} is {}",
+            megabytes(needed(tier)),
+            megabytes(limit)
+        )
+    };
+    match (choices.into_iter().find(fits), options.memory_limit_bytes) {
+        (Some(tier), _) if options.tier == TierChoice::Fixed(tier) => {
+            Ok((tier, "asked for".into()))
+        }
+        (Some(tier), _) => Ok((tier, format!("the largest that fits: {}", explain(tier)))),
+        (None, Some(limit_bytes)) => {
+            let least = tier.unwrap_or(Tier::Small);
+            Err(Error::Memory {
+                tier: least.name(),
+                needed_bytes: needed(least),
+                limit_bytes,
+            })
+        }
+        (None, None) => Ok((Tier::Small, format!("none fits: {}", explain(Tier::Small)))),
+    }
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 / 1e6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chosen(tier: TierChoice, limit: u64) -> Result<Tier> {
+        let options = Options {
+            tier,
+            memory_limit_bytes: Some(limit),
+            ..Options::default()
+        };
+        choose_tier(&options, 500_000, 1_000_000).map(|(tier, _)| tier)
+    }
+
+    /// A million triangles: each limit just at a tier's need takes that tier, one byte less the next.
+    #[test]
+    fn auto_takes_the_largest_that_fits() {
+        let needed = |tier| needed_bytes(tier, 500_000, 1_000_000);
+        for (tier, next) in [
+            (Tier::Full, Some(Tier::Medium)),
+            (Tier::Medium, Some(Tier::Small)),
+            (Tier::Small, None),
+        ] {
+            assert_eq!(chosen(TierChoice::Auto, needed(tier)).unwrap(), tier);
+            assert_eq!(chosen(TierChoice::Auto, needed(tier) - 1).ok(), next);
+        }
+    }
+
+    #[test]
+    fn a_limit_that_cannot_be_kept_is_refused_with_what_is_needed() {
+        let error = chosen(TierChoice::Fixed(Tier::Full), 1_000_000)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("full") && error.contains("1.0 MB"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn the_peak_is_at_least_what_a_test_holds() {
+        let held = vec![1u8; 1 << 20];
+        assert!(peak_rss_bytes().unwrap() > held.len() as u64);
+        assert!(available_bytes() > 0);
+    }
+}

@@ -1,0 +1,161 @@
+//! What a caller can ask for.
+
+use crate::error::{Error, Result};
+use crate::mesh::Tier;
+
+/// When to stop. The first that is reached stops; at least one must be given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Targets {
+    /// The fraction of the triangles to keep, 0 to 1: the target is floor(ratio × triangles).
+    pub ratio: Option<f64>,
+    /// The number of triangles to keep.
+    pub triangles: Option<usize>,
+    /// The largest estimated distance from the original surface, in model units. An estimate, not
+    /// a bound: distances to the planes of the faces around a collapse, added up.
+    pub max_error: Option<f64>,
+}
+
+/// What may happen to the boundary. The topology of its loops is kept in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Boundary {
+    /// Boundary edges weigh more than surface: the boundary keeps its shape.
+    #[default]
+    Keep,
+    /// Boundary vertices stay where they are, bit for bit.
+    Lock,
+    /// Boundary edges weigh nothing: the boundary may shrink.
+    Free,
+}
+
+/// Where the vertex that is left of an edge goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Placement {
+    /// Where the cost is least.
+    #[default]
+    Optimal,
+    /// To the better end: output vertices are a subset of the input's, bit for bit.
+    Endpoint,
+}
+
+/// Which memory tier to decimate in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TierChoice {
+    /// The largest that fits the memory limit.
+    #[default]
+    Auto,
+    /// This one.
+    Fixed(Tier),
+}
+
+/// Everything a caller can choose. `Options { targets, ..Options::default() }` reads well.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// When to stop.
+    pub targets: Targets,
+    /// What may happen to the boundary.
+    pub boundary: Boundary,
+    /// Where merged vertices go.
+    pub placement: Placement,
+    /// The memory tier.
+    pub tier: TierChoice,
+    /// The bytes that decimation may use, for [`TierChoice::Auto`]; the memory that is free where
+    /// it is not given.
+    pub memory_limit_bytes: Option<u64>,
+    /// Whether vertices at equal positions become one first.
+    pub weld: bool,
+    /// Whether every invariant of the mesh is verified after every collapse (linear time each).
+    pub check: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            targets: Targets::default(),
+            boundary: Boundary::default(),
+            placement: Placement::default(),
+            tier: TierChoice::default(),
+            memory_limit_bytes: None,
+            weld: true,
+            check: false,
+        }
+    }
+}
+
+impl Targets {
+    /// The number of triangles to stop at, of `triangles`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOptions`] where no target is given or one lies outside its range.
+    pub fn triangles_of(&self, triangles: usize) -> Result<usize> {
+        let Self {
+            ratio,
+            triangles: wanted,
+            max_error,
+        } = *self;
+        if ratio.is_none() && wanted.is_none() && max_error.is_none() {
+            return Err(Error::InvalidOptions(
+                "no target: give a ratio, a number of triangles or a largest error".into(),
+            ));
+        }
+        if let Some(ratio) = ratio.filter(|r| !(0.0..=1.0).contains(r)) {
+            return Err(Error::InvalidOptions(format!(
+                "ratio {ratio}: the fraction of triangles to keep lies between 0 and 1"
+            )));
+        }
+        if let Some(error) = max_error.filter(|e| !(e.is_finite() && *e >= 0.0)) {
+            return Err(Error::InvalidOptions(format!(
+                "largest error {error}: a finite length in model units, 0 or more, is expected"
+            )));
+        }
+        let of_ratio = ratio.map(|r| (r * triangles as f64).floor() as usize);
+        // The first target that is reached stops, and that is the larger number.
+        Ok(of_ratio.max(wanted).unwrap_or(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_larger_target_is_reached_first() {
+        let both = Targets {
+            ratio: Some(0.1),
+            triangles: Some(300),
+            max_error: None,
+        };
+        assert_eq!(both.triangles_of(1000).unwrap(), 300);
+        assert_eq!(both.triangles_of(9999).unwrap(), 999);
+    }
+
+    #[test]
+    fn targets_outside_their_range_are_refused() {
+        for targets in [
+            Targets::default(),
+            Targets {
+                ratio: Some(1.5),
+                ..Targets::default()
+            },
+            Targets {
+                ratio: Some(-0.1),
+                ..Targets::default()
+            },
+            Targets {
+                ratio: Some(f64::NAN),
+                ..Targets::default()
+            },
+            Targets {
+                max_error: Some(-1.0),
+                ..Targets::default()
+            },
+            Targets {
+                max_error: Some(f64::INFINITY),
+                ..Targets::default()
+            },
+        ] {
+            assert!(targets.triangles_of(10).is_err(), "{targets:?}");
+        }
+    }
+}

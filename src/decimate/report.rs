@@ -1,0 +1,99 @@
+//! What a run did, in numbers with units.
+
+use serde::Serialize;
+
+use crate::clean::Cleaning;
+use crate::mesh::Tier;
+
+/// Why decimation stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The number of triangles asked for is reached.
+    Target,
+    /// Every collapse that is left would exceed the largest error (or is blocked otherwise).
+    MaxError,
+    /// No collapse is left that keeps the topology, turns no face and moves no locked vertex.
+    Blocked,
+    /// The caller asked to stop.
+    Cancelled,
+}
+
+/// Why the edges that are left cannot be collapsed, counted when decimation stopped short.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Blocked {
+    /// The topology would change.
+    pub link: usize,
+    /// A face would turn by more than 90° or lose its area.
+    pub flip: usize,
+    /// Both ends are locked.
+    pub lock: usize,
+    /// The estimated error would exceed the largest allowed.
+    pub error: usize,
+}
+
+/// What a run did. Serialised, the keys are the command's report.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct Report {
+    /// Vertices of the input, before cleaning.
+    pub vertices_in: usize,
+    /// Triangles of the input, before cleaning; polygons count as their fans.
+    pub triangles_in: usize,
+    /// What cleaning found and did.
+    #[serde(flatten)]
+    pub cleaning: Cleaning,
+    /// Faces turned round to agree with their neighbours while decimating (undone on writing).
+    pub reoriented_faces: usize,
+    /// Non-manifold edges of the cleaned input.
+    pub non_manifold_edges_in: usize,
+    /// The number of triangles asked for; 0 where only an error was given.
+    pub target_triangles: usize,
+    /// The largest error asked for, in model units.
+    pub max_error: Option<f64>,
+    /// Vertices of the output.
+    pub vertices_out: usize,
+    /// Triangles of the output; folded double-sided ones count as two.
+    pub triangles_out: usize,
+    /// Why it stopped.
+    pub stop_reason: StopReason,
+    /// Whether fewer triangles were asked for than could be reached without exceeding the error.
+    pub stopped_short: bool,
+    /// Why the edges that are left cannot be collapsed, where it stopped before the target.
+    pub blocked: Option<Blocked>,
+    /// Collapses done.
+    pub collapses: usize,
+    /// Of these, the ones with a non-manifold vertex at an end.
+    pub collapses_non_manifold: usize,
+    /// Times a candidate was refused because the topology would have changed.
+    pub rejected_link: usize,
+    /// Times a candidate was refused because a face would have turned or lost its area.
+    pub rejected_flip: usize,
+    /// Candidates never considered because both ends are locked.
+    pub rejected_lock: usize,
+    /// Times a candidate was refused because of the largest error.
+    pub rejected_error: usize,
+    /// The largest estimated distance of an output vertex from the original, in model units.
+    pub max_error_estimate: f64,
+    /// The tier that was used.
+    pub tier: Tier,
+    /// Why that tier.
+    pub tier_reason: String,
+    /// The bytes of the mesh when built: the tier's words, positions and side tables.
+    pub mesh_bytes: usize,
+    /// The most bytes that the decimation's own arrays held at once.
+    pub working_bytes: usize,
+    /// Seconds to read the file; filled in by whoever read it.
+    pub read_seconds: f64,
+    /// Seconds to weld, drop and fold.
+    pub clean_seconds: f64,
+    /// Seconds to build connectivity.
+    pub build_seconds: f64,
+    /// Seconds to evaluate all candidates, collapse, and compact.
+    pub decimate_seconds: f64,
+    /// Seconds to write the file; filled in by whoever wrote it.
+    pub write_seconds: f64,
+    /// The most memory that the process held at once; filled in by whoever can ask the system.
+    pub peak_rss_bytes: Option<u64>,
+}

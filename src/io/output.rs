@@ -1,0 +1,361 @@
+//! Writing: the file beside that takes its place when it is whole, and the four formats.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::indexed_mesh::IndexedMesh;
+
+use super::text::write_number;
+
+/// How much is written at a time.
+const BLOCK_BYTES: usize = 1 << 20;
+
+/// Has `write` fill the file at `path`, or standard output where that is `-`.
+pub(super) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<()> {
+    let cannot = |action| {
+        move |source| Error::Io {
+            path: path.to_path_buf(),
+            action,
+            source,
+        }
+    };
+    let buffered = |file: &mut dyn Write| {
+        let mut writer = BufWriter::with_capacity(BLOCK_BYTES, file);
+        write(&mut writer)?;
+        writer.flush()
+    };
+    if path == Path::new("-") {
+        return buffered(&mut io::stdout().lock()).map_err(cannot("cannot write"));
+    }
+    match fs::metadata(path) {
+        Ok(there) if there.is_dir() => {
+            let source = io::Error::from(io::ErrorKind::IsADirectory);
+            Err(cannot("cannot write")(source))
+        }
+        Ok(there) if !there.is_file() => {
+            let mut file = OpenOptions::new()
+                .write(true)
+                .open(path)
+                .map_err(cannot("cannot open"))?;
+            buffered(&mut file).map_err(cannot("cannot write"))
+        }
+        there => {
+            // Through a link, so that the link stays and what it points to is replaced.
+            let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+            let mut beside =
+                create_beside(&target).map_err(cannot("cannot create a file beside"))?;
+            buffered(beside.as_file_mut()).map_err(cannot("cannot write"))?;
+            if let Ok(there) = there {
+                let same = beside.as_file().set_permissions(there.permissions());
+                same.map_err(cannot("cannot set permissions"))?;
+            }
+            beside
+                .persist(&target)
+                .map_err(|e| cannot("cannot replace")(e.error))?;
+            Ok(())
+        }
+    }
+}
+
+/// A file beside `target`, on the same disk so that it can be renamed; gone again unless it is.
+fn create_beside(target: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
+    let directory = match target.parent() {
+        Some(parent) if parent != Path::new("") => parent.to_path_buf(),
+        _ => PathBuf::from("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".decimate-");
+    // The usual permissions of a new file, from which the system takes the umask away.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(directory)
+}
+
+/// The scalar type that holds a mesh's coordinates: without an origin of its own a mesh is single
+/// precision, and leaves with the bits it came with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Scalar {
+    Float,
+    Double,
+}
+
+impl Scalar {
+    fn of(mesh: &IndexedMesh) -> Scalar {
+        if mesh.origin().to_array() == [0.0; 3] {
+            Scalar::Float
+        } else {
+            Scalar::Double
+        }
+    }
+}
+
+/// A vertex in the file's coordinates. Adding an origin of zero would turn −0 into 0.
+fn point(mesh: &IndexedMesh, v: usize) -> [f64; 3] {
+    let position = mesh.positions()[v].as_dvec3();
+    match Scalar::of(mesh) {
+        Scalar::Float => position.to_array(),
+        Scalar::Double => (mesh.origin() + position).to_array(),
+    }
+}
+
+/// Writes a vertex as text, its coordinates with blanks between.
+fn write_point(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    v: usize,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    let single = Scalar::of(mesh) == Scalar::Float;
+    for (axis, x) in point(mesh, v).into_iter().enumerate() {
+        if axis > 0 {
+            writer.write_all(b" ")?;
+        }
+        write_number(writer, x, single, digits)?;
+    }
+    Ok(())
+}
+
+fn ply_header(writer: &mut dyn Write, mesh: &IndexedMesh, encoding: &str) -> io::Result<()> {
+    let scalar = match Scalar::of(mesh) {
+        Scalar::Float => "float",
+        Scalar::Double => "double",
+    };
+    write!(
+        writer,
+        "ply\nformat {encoding} 1.0\nelement vertex {}\nproperty {scalar} x\nproperty {scalar} y\n\
+         property {scalar} z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        mesh.positions().len(),
+        mesh.triangle_count()
+    )
+}
+
+/// Binary little-endian PLY.
+pub(super) fn ply_binary(writer: &mut dyn Write, mesh: &IndexedMesh) -> io::Result<()> {
+    ply_header(writer, mesh, "binary_little_endian")?;
+    for v in 0..mesh.positions().len() {
+        for x in point(mesh, v) {
+            match Scalar::of(mesh) {
+                Scalar::Float => writer.write_all(&(x as f32).to_le_bytes())?,
+                Scalar::Double => writer.write_all(&x.to_le_bytes())?,
+            }
+        }
+    }
+    for triangle in mesh.sides() {
+        let mut bytes = [3; 13];
+        for (to, v) in bytes[1..].as_chunks_mut().0.iter_mut().zip(triangle) {
+            *to = v.to_le_bytes();
+        }
+        writer.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+/// ASCII PLY.
+pub(super) fn ply_ascii(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    ply_header(writer, mesh, "ascii")?;
+    write_counted_lists(writer, mesh, digits)
+}
+
+/// OFF.
+pub(super) fn off(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    writeln!(
+        writer,
+        "OFF\n{} {} 0",
+        mesh.positions().len(),
+        mesh.triangle_count()
+    )?;
+    write_counted_lists(writer, mesh, digits)
+}
+
+/// A line `x y z` a vertex and a line `3 a b c` a triangle.
+fn write_counted_lists(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    for v in 0..mesh.positions().len() {
+        write_point(writer, mesh, v, digits)?;
+        writer.write_all(b"\n")?;
+    }
+    for [a, b, c] in mesh.sides() {
+        writeln!(writer, "3 {a} {b} {c}")?;
+    }
+    Ok(())
+}
+
+/// Wavefront OBJ.
+pub(super) fn obj(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    for v in 0..mesh.positions().len() {
+        writer.write_all(b"v ")?;
+        write_point(writer, mesh, v, digits)?;
+        writer.write_all(b"\n")?;
+    }
+    for [a, b, c] in mesh.sides() {
+        let from_one = |v| u64::from(v) + 1;
+        writeln!(writer, "f {} {} {}", from_one(a), from_one(b), from_one(c))?;
+    }
+    Ok(())
+}
+
+/// Binary STL, which has single precision and no other.
+pub(super) fn stl_binary(writer: &mut dyn Write, mesh: &IndexedMesh) -> io::Result<()> {
+    let mut header = [0; 84];
+    header[..16].copy_from_slice(b"made by decimate");
+    let count = u32::try_from(mesh.triangle_count()).expect("2^31-1 edges are fewer triangles");
+    header[80..].copy_from_slice(&count.to_le_bytes());
+    writer.write_all(&header)?;
+    for triangle in mesh.sides() {
+        let corners = triangle.map(|v| point(mesh, v as usize));
+        let mut bytes = [0; 50];
+        let numbers = [normal(corners), corners[0], corners[1], corners[2]];
+        for (to, &x) in bytes
+            .as_chunks_mut()
+            .0
+            .iter_mut()
+            .zip(numbers.as_flattened())
+        {
+            *to = (x as f32).to_le_bytes();
+        }
+        writer.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+/// ASCII STL.
+pub(super) fn stl_ascii(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    digits: Option<usize>,
+) -> io::Result<()> {
+    writer.write_all(b"solid decimate\n")?;
+    for triangle in mesh.sides() {
+        let [x, y, z] = normal(triangle.map(|v| point(mesh, v as usize)));
+        writeln!(
+            writer,
+            " facet normal {} {} {}\n  outer loop",
+            x as f32, y as f32, z as f32
+        )?;
+        for v in triangle {
+            writer.write_all(b"   vertex ")?;
+            write_point(writer, mesh, v as usize, digits)?;
+            writer.write_all(b"\n")?;
+        }
+        writer.write_all(b"  endloop\n endfacet\n")?;
+    }
+    writer.write_all(b"endsolid decimate\n")
+}
+
+/// The unit normal of a triangle, or zero where it has none.
+fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+    let minus = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+    let (u, v) = (minus(b, a), minus(c, a));
+    let cross = [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ];
+    let length = (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]).sqrt();
+    if length > 0.0 && length.is_finite() {
+        cross.map(|x| x / length)
+    } else {
+        [0.0; 3]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_normal_follows_the_right_hand() {
+        let corners = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
+        assert_eq!(normal(corners), [0.0, 0.0, 1.0]);
+        assert_eq!(normal([corners[0], corners[1], corners[1]]), [0.0; 3]);
+    }
+
+    /// A writer that fails halfway leaves the old file and nothing beside it.
+    #[test]
+    fn no_half_file() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.ply");
+        fs::write(&path, "old").unwrap();
+        let result = write_file(&path, |writer| {
+            writer.write_all(b"new")?;
+            Err(io::Error::other("disk full"))
+        });
+        let message = result.unwrap_err().to_string();
+        assert!(
+            message.ends_with("a.ply: cannot write: disk full"),
+            "{message}"
+        );
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links_and_permissions_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().unwrap();
+        let (file, link) = (
+            directory.path().join("a.ply"),
+            directory.path().join("link.ply"),
+        );
+        fs::write(&file, "old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_file(&link, |writer| writer.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert_eq!(
+            fs::metadata(&file).unwrap().permissions().mode() & 0o777,
+            0o640
+        );
+    }
+
+    /// As any other program's: what the umask leaves of 0666, not a temporary file's 0600.
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_has_the_usual_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().unwrap();
+        let (ours, usual) = (directory.path().join("a"), directory.path().join("b"));
+        write_file(&ours, |writer| writer.write_all(b"x")).unwrap();
+        fs::write(&usual, "x").unwrap();
+        let mode = |path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&usual));
+    }
+
+    #[test]
+    fn a_directory_is_no_file() {
+        let directory = tempfile::tempdir().unwrap();
+        let error = write_file(directory.path(), |_| Ok(()))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("cannot write: "), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_written_to_directly() {
+        write_file(Path::new("/dev/null"), |writer| writer.write_all(b"x")).unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    }
+}

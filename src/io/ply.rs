@@ -1,0 +1,511 @@
+//! PLY through ply-rs-bw, element by element: a face is on its way to the mesh before the next one
+//! is read.
+
+use std::io::{self, BufReader, ErrorKind, Read};
+
+use ply_rs_bw::parser::{ParseError, Parser};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
+
+use crate::error::{Error, Place, Result};
+use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
+
+use super::input::Input;
+use super::ply_header::{self, CORNERS, Role};
+use super::text::{Lines, parse_number, quote, words};
+
+/// Reads a PLY file: vertices, faces, triangle strips. Other elements and properties are skipped.
+pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
+    let header = ply_header::read(&mut input)?;
+    let vertices = header.vertices();
+    let body = match header.encoding {
+        Encoding::Ascii => Body::Ascii(Lines::after(input, header.lines)),
+        encoding => Body::Binary {
+            little: encoding == Encoding::BinaryLittleEndian,
+            position: header.bytes,
+            input,
+        },
+    };
+    let mut reader = ElementReader {
+        parser: Parser::new(),
+        body,
+        start: 0,
+    };
+    let mut builder = MeshBuilder::default();
+    let mut corners = Vec::new();
+    for def in &header.elements {
+        let role = Role::of(def);
+        // Nothing to read, so no number of them ever ends the file.
+        let count = if def.properties.is_empty() {
+            0
+        } else {
+            def.count
+        };
+        for i in 0..count {
+            let element = reader.next(def, i)?;
+            match role {
+                Role::Vertex { single: true } => {
+                    builder.push_single(element.position.map(|x| x as f32));
+                }
+                Role::Vertex { single: false } => {
+                    builder.push_double(element.position);
+                }
+                Role::Face => {
+                    let list = |v| corner(v, vertices).ok_or(v);
+                    element
+                        .corners(&mut corners, list)
+                        .map_err(|v| reader.outside(def, i, v, vertices))?;
+                    builder.push_polygon(&corners);
+                }
+                Role::Strips => {
+                    let list = |v| {
+                        if v == -1 {
+                            Ok(RESTART)
+                        } else {
+                            corner(v, vertices).ok_or(v)
+                        }
+                    };
+                    element
+                        .corners(&mut corners, list)
+                        .map_err(|v| reader.outside(def, i, v, vertices))?;
+                    push_strips(&mut builder, &corners);
+                }
+                Role::Other => {}
+            }
+        }
+    }
+    builder.finish()
+}
+
+/// A vertex number, if there is such a vertex.
+fn corner(v: i64, vertices: usize) -> Option<u32> {
+    u32::try_from(v)
+        .ok()
+        .filter(|&v| (v as usize) < vertices && v != RESTART)
+}
+
+/// What stands between two strips of one list; more vertices than a mesh can have.
+const RESTART: u32 = u32::MAX;
+
+/// Adds the triangles of strips. Every other one runs the other way round; one that uses a vertex
+/// twice is a joint of the strip and no triangle.
+///
+/// ```text
+///   0 ── 2 ── 4
+///    \  / \  /        012, 213, 234
+///     1 ── 3
+/// ```
+fn push_strips(builder: &mut MeshBuilder, corners: &[u32]) {
+    for strip in corners.split(|&v| v == RESTART) {
+        for (i, window) in strip.windows(3).enumerate() {
+            let &[a, b, c] = window else { continue };
+            if a != b && b != c && c != a {
+                builder.push_triangle(if i % 2 == 0 { [a, b, c] } else { [b, a, c] });
+            }
+        }
+    }
+}
+
+/// What the mesh takes from one element.
+#[derive(Default)]
+struct Element {
+    position: [f64; 3],
+    list: Option<Property>,
+}
+
+impl PropertyAccess for Element {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let axis = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            CORNERS => {
+                self.list = Some(property);
+                return PropertyAccessResult::Set;
+            }
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.position[axis] = match property {
+            Property::Char(x) => x.into(),
+            Property::UChar(x) => x.into(),
+            Property::Short(x) => x.into(),
+            Property::UShort(x) => x.into(),
+            Property::Int(x) => x.into(),
+            Property::UInt(x) => x.into(),
+            Property::Float(x) => x.into(),
+            Property::Double(x) => x,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+impl Element {
+    /// Fills `corners` from the list of whatever integers, or returns the first that `checked`
+    /// refuses.
+    fn corners(
+        &self,
+        corners: &mut Vec<u32>,
+        checked: impl Fn(i64) -> std::result::Result<u32, i64>,
+    ) -> std::result::Result<(), i64> {
+        fn fill<T: Copy + Into<i64>>(
+            corners: &mut Vec<u32>,
+            list: &[T],
+            checked: impl Fn(i64) -> std::result::Result<u32, i64>,
+        ) -> std::result::Result<(), i64> {
+            for &v in list {
+                corners.push(checked(v.into())?);
+            }
+            Ok(())
+        }
+        corners.clear();
+        match &self.list {
+            Some(Property::ListChar(list)) => fill(corners, list, checked),
+            Some(Property::ListUChar(list)) => fill(corners, list, checked),
+            Some(Property::ListShort(list)) => fill(corners, list, checked),
+            Some(Property::ListUShort(list)) => fill(corners, list, checked),
+            Some(Property::ListInt(list)) => fill(corners, list, checked),
+            Some(Property::ListUInt(list)) => fill(corners, list, checked),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Where the elements come from.
+enum Body {
+    Ascii(Lines),
+    Binary {
+        little: bool,
+        position: u64,
+        input: Input,
+    },
+}
+
+struct ElementReader {
+    parser: Parser<Element>,
+    body: Body,
+    /// The byte of a binary file where the last element began.
+    start: u64,
+}
+
+impl ElementReader {
+    /// Element `i` of those that `def` defines.
+    fn next(&mut self, def: &ElementDef, i: usize) -> Result<Element> {
+        match &mut self.body {
+            Body::Ascii(lines) => {
+                while lines.advance()? {
+                    if words(lines.line()).next().is_some() {
+                        return parse_line(&self.parser, lines, def);
+                    }
+                }
+                let found = format!("the file ends before {} {i}", def.name);
+                let expected = format!("{} of them, as the header says", def.count);
+                Err(lines.error_at_end(&found, &expected))
+            }
+            Body::Binary {
+                little,
+                position,
+                input,
+            } => {
+                self.start = *position;
+                let mut counted = Counted {
+                    reader: &mut input.reader,
+                    position,
+                };
+                let element = if *little {
+                    self.parser.read_little_endian_element(&mut counted, def)
+                } else {
+                    self.parser.read_big_endian_element(&mut counted, def)
+                };
+                element.map_err(|e| binary_error(input, self.start, def, i, &e))
+            }
+        }
+    }
+
+    /// The error for a corner that names no vertex.
+    fn outside(&self, def: &ElementDef, i: usize, v: i64, vertices: usize) -> Error {
+        let found = format!("{} {i} uses vertex {v}", def.name);
+        let expected = match vertices {
+            0 => "vertices in the file".to_string(),
+            n => format!("0 to {}", n - 1),
+        };
+        match &self.body {
+            Body::Ascii(lines) => lines.error(&found, &expected),
+            Body::Binary {
+                position, input, ..
+            } => input.error(Place::Byte(*position), &found, &expected),
+        }
+    }
+}
+
+/// Parses one line of an ASCII file.
+fn parse_line(parser: &Parser<Element>, lines: &Lines, def: &ElementDef) -> Result<Element> {
+    let parse = |line: &str| parser.read_ascii_element(line, def).ok();
+    std::str::from_utf8(lines.line())
+        .ok()
+        .and_then(parse)
+        .or_else(|| parse(&respell(lines.line())?))
+        .ok_or_else(|| {
+            let names: Vec<_> = def.properties.keys().map(String::as_str).collect();
+            let found = format!("{} {}", def.name, quote(lines.line()));
+            lines.error(&found, &format!("numbers for {}", names.join(" ")))
+        })
+}
+
+/// A line with its numbers spelled as ply-rs-bw wants them, which knows neither `1.` nor `.5`, and
+/// no `nan`: what is not finite becomes infinite, which the cleaning drops just as well.
+fn respell(line: &[u8]) -> Option<String> {
+    let mut text = String::new();
+    for word in words(line) {
+        let x = parse_number(word)?;
+        let finite = if x.is_nan() { f64::INFINITY } else { x };
+        if finite.is_infinite() {
+            text.push_str(if finite < 0.0 { "-1e999 " } else { "1e999 " });
+        } else {
+            text.push_str(&format!("{finite} "));
+        }
+    }
+    Some(text)
+}
+
+fn binary_error(input: &Input, start: u64, def: &ElementDef, i: usize, e: &ParseError) -> Error {
+    let name = &def.name;
+    match e.kind() {
+        ErrorKind::UnexpectedEof => {
+            let found = format!("the file ends in {name} {i}");
+            let expected = format!("{} of them, as the header says", def.count);
+            input.error(Place::Byte(start), &found, &expected)
+        }
+        // All that can be wrong with bytes, once the header's types have been checked.
+        ErrorKind::InvalidInput | ErrorKind::InvalidData => {
+            let found = format!("{name} {i} has a list of negative length");
+            input.error(Place::Byte(start), &found, "a length of 0 or more")
+        }
+        kind => input.io_error(io::Error::new(kind, e.to_string())),
+    }
+}
+
+/// Counts the bytes that go through.
+struct Counted<'a> {
+    reader: &'a mut BufReader<Box<dyn Read>>,
+    position: &'a mut u64,
+}
+
+impl Read for Counted<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.reader.read(buffer)?;
+        *self.position += n as u64;
+        Ok(n)
+    }
+
+    #[inline]
+    fn read_exact(&mut self, buffer: &mut [u8]) -> io::Result<()> {
+        self.reader.read_exact(buffer)?;
+        *self.position += buffer.len() as u64;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_bytes(bytes: impl Into<Vec<u8>>) -> Result<IndexedMesh> {
+        read(Input::from_bytes("a.ply", bytes)?)
+    }
+
+    fn mesh(bytes: impl Into<Vec<u8>>) -> IndexedMesh {
+        read_bytes(bytes).unwrap()
+    }
+
+    fn message(bytes: impl Into<Vec<u8>>) -> String {
+        read_bytes(bytes).unwrap_err().to_string()
+    }
+
+    const HEADER: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n\
+                          property float y\nproperty float z\nelement face 1\n\
+                          property list uchar int vertex_indices\nend_header\n";
+    const BODY: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
+
+    fn square() -> IndexedMesh {
+        mesh(format!("{HEADER}{BODY}"))
+    }
+
+    #[test]
+    fn a_polygon_becomes_a_fan() {
+        assert_eq!(square().triangles(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(square().positions()[2].to_array(), [1.0, 1.0, 0.0]);
+    }
+
+    /// Faces first, properties and an element of no interest, other names and types.
+    #[test]
+    fn order_and_company_do_not_matter() {
+        let text = "ply\nformat ascii 1.0\nelement face 1\nproperty float quality\n\
+                    property list int uint vertex_index\nproperty list uchar float texcoord\n\
+                    element camera 2\nproperty float x\nelement vertex 4\nproperty uchar red\n\
+                    property double z\nproperty short x\nproperty list uchar uchar extra\n\
+                    property int8 y\nend_header\n\
+                    0.5 4 0 1 2 3 2 0.5 0.5\n7\n8\n\
+                    255 0 0 1 9 0\n255 0 1 0 0\n255 0 1 2 8 9 1\n255 0 0 0 1\n";
+        assert_eq!(mesh(text), square());
+    }
+
+    #[test]
+    fn harmless_header_quirks_are_tidied() {
+        let quirks = HEADER
+            .replace("format ascii", " format \t  ascii")
+            .replace("element face", "\telement\t face")
+            .replace("float x", "float x  \ncomment caf\u{e9}\nobj_info x\n");
+        assert_eq!(mesh(format!("{quirks}{BODY}")), square());
+        for end in ["\r\n", "\r"] {
+            assert_eq!(
+                mesh(format!("{HEADER}{BODY}").replace('\n', end)),
+                square(),
+                "{end:?}"
+            );
+        }
+        let latin = [
+            b"ply\ncomment \xe9\n",
+            &format!("{HEADER}{BODY}").as_bytes()[4..],
+        ]
+        .concat();
+        assert_eq!(mesh(latin), square());
+    }
+
+    /// Two properties of one name are two numbers in each line; the first one counts.
+    #[test]
+    fn properties_of_one_name_are_not_merged() {
+        let header = HEADER.replace(
+            "float z\n",
+            "float z\nproperty float z\nproperty float 9.k\n",
+        );
+        let body = BODY.replace(" 0\n", " 0 5 6\n");
+        assert_eq!(mesh(format!("{header}{body}")), square());
+    }
+
+    /// A body that begins with the byte `\n`: only a header of `\r` alone leaves it there.
+    #[test]
+    fn the_first_byte_of_the_body_may_be_a_line_feed() {
+        let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\n\
+                      property uchar y\nproperty uchar z\nend_header\n";
+        for end in ["\n", "\r\n", "\r"] {
+            let bytes = [header.replace('\n', end).as_bytes(), &[10, 20, 30]].concat();
+            assert_eq!(
+                mesh(bytes).positions()[0].to_array(),
+                [10.0, 20.0, 30.0],
+                "{end:?}"
+            );
+        }
+    }
+
+    /// The square with every type of coordinate, count and index, in both byte orders.
+    #[test]
+    fn every_type_and_byte_order_reads_the_same() {
+        let bytes_of = |name: &str, x: i32, big: bool| {
+            let mut bytes = match name {
+                "char" | "uint8" => vec![x as u8],
+                "short" | "uint16" => (x as i16).to_le_bytes().to_vec(),
+                "int" | "uint32" => x.to_le_bytes().to_vec(),
+                "float" => (x as f32).to_le_bytes().to_vec(),
+                _ => f64::from(x).to_le_bytes().to_vec(),
+            };
+            if big {
+                bytes.reverse();
+            }
+            bytes
+        };
+        let integers = ["char", "uint8", "short", "uint16", "int", "uint32"];
+        for big in [false, true] {
+            for (coordinate, count, index) in [
+                integers,
+                ["float", "double", "float", "double", "int", "char"],
+            ]
+            .concat()
+            .into_iter()
+            .enumerate()
+            .map(|(i, name)| (name, integers[i % 6], integers[(i + i / 6) % 6]))
+            {
+                let order = if big { "big" } else { "little" };
+                let header = HEADER
+                    .replace("ascii", &format!("binary_{order}_endian"))
+                    .replace("float", coordinate)
+                    .replace("uchar int", &format!("{count} {index}"));
+                let mut bytes = header.into_bytes();
+                for x in [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0] {
+                    bytes.extend(bytes_of(coordinate, x, big));
+                }
+                bytes.extend(bytes_of(count, 4, big));
+                for v in 0..4 {
+                    bytes.extend(bytes_of(index, v, big));
+                }
+                assert_eq!(
+                    mesh(bytes),
+                    square(),
+                    "{coordinate} {count} {index} {order}"
+                );
+            }
+        }
+    }
+
+    /// Two strips; the first has a joint (2 2) that keeps the turn of what follows.
+    #[test]
+    fn strips_turn_every_other_triangle() {
+        let header = HEADER.replace("element face", "element tristrips");
+        let text = format!("{header}{}9 0 1 2 2 3 -1 3 2 0\n", &BODY[..24]);
+        assert_eq!(mesh(text).triangles(), [[0, 1, 2], [3, 2, 0]]);
+        let text = format!("{header}{}7 0 1 2 3 -1 3 2\n", &BODY[..24]);
+        assert_eq!(mesh(text).triangles(), [[0, 1, 2], [2, 1, 3]]);
+    }
+
+    #[test]
+    fn numbers_that_the_grammar_of_ply_rs_does_not_know() {
+        let mesh = mesh(format!(
+            "{HEADER}nan -inf 0\n1. .5 -1.e0\n1 1 0\n0 1 0\n3 0 1 2\n"
+        ));
+        assert!(!mesh.positions()[0].x.is_finite() && !mesh.positions()[0].y.is_finite());
+        assert_eq!(mesh.positions()[1].to_array(), [1.0, 0.5, -1.0]);
+    }
+
+    #[test]
+    fn doubles_keep_what_floats_cannot_hold() {
+        let text = format!("{HEADER}{BODY}")
+            .replace("float", "double")
+            .replace("1 1 0", "1 1 0.1");
+        let far = text
+            .replace("\n1 ", "\n5000000.001 ")
+            .replace("\n0 ", "\n5000000 ");
+        let mesh = mesh(far);
+        assert!(
+            mesh.points()
+                .all(|p| (p.x - 5.0e6).abs() < 2.0e-3 && p.x >= 5.0e6)
+        );
+        assert!((mesh.points().nth(1).unwrap().x - 5000000.001).abs() < 1.0e-8);
+    }
+
+    /// More elements than any memory holds, of no bytes each.
+    #[test]
+    fn elements_without_properties_take_no_time() {
+        let header = HEADER.replace("element face", "element void 99999999999999\nelement face");
+        assert_eq!(mesh(format!("{header}{BODY}")), square());
+        let binary = "ply\nformat binary_little_endian 1.0\nelement x 99999999999\nend_header\n";
+        assert_eq!(mesh(binary).triangle_count(), 0);
+    }
+
+    #[test]
+    fn errors_say_where() {
+        let expected = "a.ply:14: face 0 uses vertex 9; expected 0 to 3";
+        assert_eq!(
+            message(format!("{HEADER}{}", BODY.replace("2 3\n", "2 9\n"))),
+            expected
+        );
+        let binary = HEADER.replace("ascii", "binary_big_endian");
+        let expected = format!(
+            "a.ply: byte {}: the file ends in vertex 1; expected 4 of them, as the header says",
+            binary.len() + 12
+        );
+        assert_eq!(message([binary.as_bytes(), &[0; 20]].concat()), expected);
+    }
+}
