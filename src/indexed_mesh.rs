@@ -278,7 +278,7 @@ fn origin_for(points: &[DVec3]) -> DVec3 {
     }
     // The smallest power of two at or above the size, by its exponent bits; 1 for a single point.
     let grid = if size > 0.0 {
-        f64::from_bits((size.to_bits() >> 52) + 1 << 52)
+        f64::from_bits(((size.to_bits() >> 52) + 1) << 52)
     } else {
         1.0
     };

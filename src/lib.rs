@@ -1,8 +1,36 @@
+//! Quadric edge-collapse mesh decimation on the directed-edge data structure of Campagna, Kobbelt
+//! and Seidel (1998).
+//!
+//! ```
+//! use decimate::decimate::{Options, Targets, decimate};
+//! use decimate::io;
+//!
+//! # fn main() -> decimate::error::Result<()> {
+//! let mesh = io::read("data/sample.ply".as_ref(), None)?;
+//! let targets = Targets { ratio: Some(0.1), ..Targets::default() };
+//! let (small, report) = decimate(mesh, &Options { targets, ..Options::default() })?;
+//! assert_eq!(small.triangle_count(), report.triangles_out);
+//! # let file = std::env::temp_dir().join("decimate_doctest.ply");
+//! io::write(&file, &small, &io::WriteOptions::default())?;
+//! # std::fs::remove_file(file).ok();
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Data flows one way: [`io`] makes an [`indexed_mesh::IndexedMesh`], [`clean`] makes a simplicial
+//! complex of it, [`decimate`] turns it into another over a [`mesh::Mesh`] in one of three memory
+//! tiers, [`io`] writes it, [`metrics`] says what is in it.
+//!
+//! # Limits
+//! At most 2³¹−1 directed edges (715 million triangles) and 2³¹−1 vertices. Coordinates are single
+//! precision, relative to one double-precision origin.
+
 pub mod clean;
 pub mod decimate;
 pub mod error;
 pub mod indexed_mesh;
 pub mod io;
 pub mod mesh;
+pub mod metrics;
 #[cfg(test)]
 mod shapes;

@@ -1,21 +1,288 @@
-use decimate::decimate::*;
-fn main() {
-    let a: Vec<String> = std::env::args().collect();
-    let m = decimate::io::read(a[1].as_ref(), None).unwrap();
-    let o = Options {
-        targets: Targets {
-            ratio: Some(a[2].parse().unwrap()),
-            ..Default::default()
-        },
-        tier: match a.get(4).map(|s| s.as_str()) {
-            Some("small") => TierChoice::Fixed(decimate::mesh::Tier::Small),
-            Some("medium") => TierChoice::Fixed(decimate::mesh::Tier::Medium),
-            _ => TierChoice::Fixed(decimate::mesh::Tier::Full),
-        },
-        check: a.get(5).is_some(),
-        ..Default::default()
+//! The `decimate` command: parse, read, decimate, write, report. The only place that prints and
+//! exits.
+
+mod cli;
+
+use std::fs::File;
+use std::io::{BufWriter, IsTerminal, Write};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
+use decimate::decimate::{Progress, Report, StopReason, decimate_with_progress, peak_rss_bytes};
+use decimate::error::Error;
+use decimate::io::{self, WriteOptions};
+use decimate::metrics::{Info, info};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use cli::{Cli, Command, InfoArgs, Run};
+
+/// Exit status of a run that stopped short under `--strict`.
+const STOPPED_SHORT: u8 = 3;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match &cli.command {
+        Some(Command::Info(args)) => show_info(args),
+        None => run(&cli.run),
     };
-    let (m, r) = decimate::decimate::decimate(m, &o).unwrap();
-    eprintln!("{r:?}");
-    decimate::io::write(a[3].as_ref(), &m, &Default::default()).unwrap();
+    done.unwrap_or_else(|error| {
+        if let Error::InvalidOptions(message) = error {
+            Cli::command()
+                .error(ErrorKind::ValueValidation, message)
+                .exit();
+        }
+        eprintln!("error: {error}");
+        ExitCode::FAILURE
+    })
+}
+
+fn run(args: &Run) -> Result<ExitCode, Error> {
+    let (Some(input), Some(output)) = (&args.input, &args.output) else {
+        unreachable!("the command line requires both");
+    };
+    let report_to_stdout = args.report.as_deref() == Some(Path::new("-"));
+    if report_to_stdout && output == Path::new("-") {
+        return Err(Error::InvalidOptions(
+            "-o - and --report - would both write to standard output".into(),
+        ));
+    }
+    if let Some(threads) = args.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| Error::InvalidOptions(format!("--threads {threads}: {error}")))?;
+    }
+    let options = args.options();
+    options.targets.triangles_of(0)?;
+    let write_options = WriteOptions {
+        format: args.output_format,
+        ascii: args.ascii,
+        precision: args.precision.map(usize::from),
+    };
+    io::output_format(output, &write_options)?;
+
+    let start = Instant::now();
+    let mesh = io::read(input, args.input_format)?;
+    let read_seconds = start.elapsed().as_secs_f64();
+
+    let bar = progress_bar(args.quiet);
+    let (mesh, mut report) = decimate_with_progress(mesh, &options, &mut |progress| {
+        advance(&bar, progress);
+        ControlFlow::Continue(())
+    })
+    .map_err(|error| name_mesh(error, input))?;
+    bar.finish_and_clear();
+
+    let start = Instant::now();
+    io::write(output, &mesh, &write_options)?;
+    report.read_seconds = read_seconds;
+    report.write_seconds = start.elapsed().as_secs_f64();
+    report.peak_rss_bytes = peak_rss_bytes();
+    if let Some(path) = &args.report {
+        write_json(path, &report)?;
+    }
+    if !args.quiet {
+        eprint!("{}", summary(input, output, &report));
+    }
+    let is_failure = args.strict && report.stopped_short;
+    Ok(if is_failure {
+        ExitCode::from(STOPPED_SHORT)
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
+    let mesh = io::read(&args.mesh, args.input_format)?;
+    let info = info(mesh, !args.no_weld).map_err(|error| name_mesh(error, &args.mesh))?;
+    if args.json {
+        write_json(Path::new("-"), &info)?;
+    } else {
+        to_stdout(table(&info).as_bytes())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// An error about a mesh, with the name of the file it came from.
+fn name_mesh(error: Error, input: &Path) -> Error {
+    match error {
+        Error::InvalidMesh(message) => {
+            Error::InvalidMesh(format!("{}: {message}", input.display()))
+        }
+        other => other,
+    }
+}
+
+fn progress_bar(quiet: bool) -> ProgressBar {
+    if quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(0);
+    let style =
+        "{bar:40} {percent:>3}%  {human_pos}/{human_len} triangles removed, {per_sec}, {eta} left";
+    bar.set_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn advance(bar: &ProgressBar, progress: Progress) {
+    bar.set_length((progress.triangles_start - progress.triangles_target) as u64);
+    bar.set_position((progress.triangles_start - progress.triangles) as u64);
+}
+
+fn to_stdout(bytes: &[u8]) -> Result<(), Error> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(bytes)
+        .and_then(|()| out.flush())
+        .map_err(|source| Error::Io {
+            path: "<stdout>".into(),
+            action: "cannot write",
+            source,
+        })
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
+    let mut text = serde_json::to_string_pretty(value)
+        .map_err(|error| Error::Internal(format!("cannot write JSON: {error}")))?;
+    text.push('\n');
+    if path == Path::new("-") {
+        return to_stdout(text.as_bytes());
+    }
+    let failed = |source| Error::Io {
+        path: path.into(),
+        action: "cannot write",
+        source,
+    };
+    let mut file = BufWriter::new(File::create(path).map_err(failed)?);
+    file.write_all(text.as_bytes())
+        .and_then(|()| file.flush())
+        .map_err(failed)
+}
+
+/// What was done, in a few lines for a person.
+fn summary(input: &Path, output: &Path, report: &Report) -> String {
+    let Report {
+        triangles_in,
+        triangles_out,
+        cleaning,
+        ..
+    } = report;
+    let seconds = report.read_seconds
+        + report.clean_seconds
+        + report.build_seconds
+        + report.decimate_seconds
+        + report.write_seconds;
+    let percent = 100.0 * *triangles_out as f64 / *triangles_in as f64;
+    let mut text = format!(
+        "{} -> {}: {triangles_in} -> {triangles_out} triangles ({percent:.1} %) in {seconds:.2} s, \
+         estimated error {:.3e}\n{} tier: {}\n",
+        input.display(),
+        output.display(),
+        report.max_error_estimate,
+        report.tier.name(),
+        report.tier_reason,
+    );
+    let found: Vec<String> = [
+        (cleaning.welded_vertices, "vertices welded"),
+        (
+            cleaning.dropped_isolated_vertices,
+            "isolated vertices dropped",
+        ),
+        (
+            cleaning.dropped_non_finite_faces,
+            "faces with coordinates that are not finite dropped",
+        ),
+        (
+            cleaning.dropped_degenerate_faces,
+            "faces with a repeated vertex dropped",
+        ),
+        (cleaning.dropped_duplicate_faces, "duplicate faces dropped"),
+        (cleaning.folded_faces, "opposite faces folded"),
+        (report.non_manifold_edges_in, "non-manifold edges"),
+        (
+            report.reoriented_faces,
+            "faces run against their neighbours",
+        ),
+    ]
+    .into_iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, what)| format!("{count} {what}"))
+    .collect();
+    if !found.is_empty() {
+        text += &format!("found: {}\n", found.join(", "));
+    }
+    if let Some(blocked) = report.blocked {
+        let why = match report.stop_reason {
+            StopReason::MaxError => "stopped at the largest error",
+            _ if report.stopped_short => "warning: stopped short of the target",
+            _ => "no collapse is left",
+        };
+        text += &format!(
+            "{why} ({} asked for); of the edges left, {} would change the topology, {} would turn a \
+             face, {} are locked, {} would exceed the largest error\n",
+            report.target_triangles, blocked.link, blocked.flip, blocked.lock, blocked.error
+        );
+    }
+    text
+}
+
+/// The counts of a mesh as a table.
+fn table(info: &Info) -> String {
+    let yes_no = |b: bool| String::from(if b { "yes" } else { "no" });
+    let cleaning = &info.cleaning;
+    let rows = [
+        ("vertices", info.vertices.to_string()),
+        ("triangles", info.triangles.to_string()),
+        ("  welded vertices", cleaning.welded_vertices.to_string()),
+        (
+            "  isolated vertices",
+            cleaning.dropped_isolated_vertices.to_string(),
+        ),
+        (
+            "  faces not finite",
+            cleaning.dropped_non_finite_faces.to_string(),
+        ),
+        (
+            "  faces with a repeated vertex",
+            cleaning.dropped_degenerate_faces.to_string(),
+        ),
+        (
+            "  duplicate faces",
+            cleaning.dropped_duplicate_faces.to_string(),
+        ),
+        ("  opposite faces folded", cleaning.folded_faces.to_string()),
+        ("  kept vertices", cleaning.kept_vertices.to_string()),
+        ("  kept faces", cleaning.kept_faces.to_string()),
+        ("components", info.components.to_string()),
+        ("boundary edges", info.boundary_edges.to_string()),
+        ("boundary loops", info.boundary_loops.to_string()),
+        ("non-manifold edges", info.non_manifold_edges.to_string()),
+        (
+            "non-manifold vertices",
+            info.non_manifold_vertices.to_string(),
+        ),
+        (
+            "inconsistently oriented edges",
+            info.inconsistent_edges.to_string(),
+        ),
+        ("orientable", yes_no(info.is_orientable)),
+        ("zero-area faces", info.zero_area_faces.to_string()),
+        (
+            "Euler characteristic",
+            info.euler_characteristic.to_string(),
+        ),
+        ("genus", info.genus.map_or("-".into(), |g| g.to_string())),
+        ("diagonal (model units)", info.diagonal.to_string()),
+        ("full tier (bytes)", info.full_tier_bytes.to_string()),
+        ("medium tier (bytes)", info.medium_tier_bytes.to_string()),
+        ("small tier (bytes)", info.small_tier_bytes.to_string()),
+    ];
+    rows.iter()
+        .map(|(name, value)| format!("{name:30} {value:>14}\n"))
+        .collect()
 }

@@ -135,6 +135,17 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<IndexedMesh> {
 /// [`Error::InvalidOptions`] where no format is given or named by the extension, or the precision
 /// is out of range; [`Error::Io`] where writing fails.
 pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<()> {
+    let format = output_format(path, options)?;
+    output::write_file(path, |mut writer| {
+        write_to(&mut writer, mesh, format, options)
+    })
+}
+
+/// The format that [`write`] would write to `path`: to be asked before the work that fills it.
+///
+/// # Errors
+/// As [`write`]'s [`Error::InvalidOptions`].
+pub fn output_format(path: &Path, options: &WriteOptions) -> Result<Format> {
     let format = match options.format {
         Some(format) => format,
         None if path == Path::new("-") => {
@@ -159,9 +170,7 @@ pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<
             "precision is 1 to 17 significant digits".into(),
         ));
     }
-    output::write_file(path, |mut writer| {
-        write_to(&mut writer, mesh, format, options)
-    })
+    Ok(format)
 }
 
 /// Writes a mesh in `format`.

@@ -1,8 +1,8 @@
 //! Wavefront OBJ: the `v` and `f` lines, as one mesh with the file's own vertex numbers.
 //!
-//! tobj parses the vertices, in blocks of lines. Handed the whole file it would keep some 130 bytes
-//! a face until the end, renumber the vertices by first use, drop the unused ones (which the report
-//! counts), and name no line in its errors.
+//! tobj parses the vertices, in blocks of lines. Handed the whole file it would keep more than 100
+//! bytes a face until the end (room for four corners of three `usize`), renumber the vertices by
+//! first use, drop the unused ones, which the report counts, and name no line in its errors.
 
 use crate::error::Result;
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder};

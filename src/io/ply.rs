@@ -32,16 +32,16 @@ pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
     };
     let mut builder = MeshBuilder::default();
     let mut corners = Vec::new();
-    for def in &header.elements {
+    // Without properties there is nothing to read, so no number of them would ever end the file.
+    for def in header
+        .elements
+        .iter()
+        .filter(|def| !def.properties.is_empty())
+    {
         let role = Role::of(def);
-        // Nothing to read, so no number of them ever ends the file.
-        let count = if def.properties.is_empty() {
-            0
-        } else {
-            def.count
-        };
-        for i in 0..count {
+        for i in 0..def.count {
             let element = reader.next(def, i)?;
+            let outside = |v| reader.outside(def, i, v, vertices);
             match role {
                 Role::Vertex { single: true } => {
                     builder.push_single(element.position.map(|x| x as f32));
@@ -50,23 +50,20 @@ pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
                     builder.push_double(element.position);
                 }
                 Role::Face => {
-                    let list = |v| corner(v, vertices).ok_or(v);
                     element
-                        .corners(&mut corners, list)
-                        .map_err(|v| reader.outside(def, i, v, vertices))?;
+                        .corners(&mut corners, |v| corner(v, vertices))
+                        .map_err(outside)?;
                     builder.push_polygon(&corners);
                 }
                 Role::Strips => {
-                    let list = |v| {
+                    let corner = |v| {
                         if v == -1 {
-                            Ok(RESTART)
+                            Some(RESTART)
                         } else {
-                            corner(v, vertices).ok_or(v)
+                            corner(v, vertices)
                         }
                     };
-                    element
-                        .corners(&mut corners, list)
-                        .map_err(|v| reader.outside(def, i, v, vertices))?;
+                    element.corners(&mut corners, corner).map_err(outside)?;
                     push_strips(&mut builder, &corners);
                 }
                 Role::Other => {}
@@ -144,31 +141,27 @@ impl PropertyAccess for Element {
 }
 
 impl Element {
-    /// Fills `corners` from the list of whatever integers, or returns the first that `checked`
+    /// Fills `corners` from the list of whatever integers, or returns the first that `corner`
     /// refuses.
     fn corners(
         &self,
         corners: &mut Vec<u32>,
-        checked: impl Fn(i64) -> std::result::Result<u32, i64>,
+        corner: impl Fn(i64) -> Option<u32>,
     ) -> std::result::Result<(), i64> {
-        fn fill<T: Copy + Into<i64>>(
-            corners: &mut Vec<u32>,
-            list: &[T],
-            checked: impl Fn(i64) -> std::result::Result<u32, i64>,
-        ) -> std::result::Result<(), i64> {
-            for &v in list {
-                corners.push(checked(v.into())?);
+        corners.clear();
+        let mut fill = |list: &mut dyn Iterator<Item = i64>| {
+            for v in list {
+                corners.push(corner(v).ok_or(v)?);
             }
             Ok(())
-        }
-        corners.clear();
+        };
         match &self.list {
-            Some(Property::ListChar(list)) => fill(corners, list, checked),
-            Some(Property::ListUChar(list)) => fill(corners, list, checked),
-            Some(Property::ListShort(list)) => fill(corners, list, checked),
-            Some(Property::ListUShort(list)) => fill(corners, list, checked),
-            Some(Property::ListInt(list)) => fill(corners, list, checked),
-            Some(Property::ListUInt(list)) => fill(corners, list, checked),
+            Some(Property::ListChar(list)) => fill(&mut list.iter().map(|&v| v.into())),
+            Some(Property::ListUChar(list)) => fill(&mut list.iter().map(|&v| v.into())),
+            Some(Property::ListShort(list)) => fill(&mut list.iter().map(|&v| v.into())),
+            Some(Property::ListUShort(list)) => fill(&mut list.iter().map(|&v| v.into())),
+            Some(Property::ListInt(list)) => fill(&mut list.iter().map(|&v| v.into())),
+            Some(Property::ListUInt(list)) => fill(&mut list.iter().map(|&v| v.into())),
             _ => Ok(()),
         }
     }
@@ -234,9 +227,7 @@ impl ElementReader {
         };
         match &self.body {
             Body::Ascii(lines) => lines.error(&found, &expected),
-            Body::Binary {
-                position, input, ..
-            } => input.error(Place::Byte(*position), &found, &expected),
+            Body::Binary { input, .. } => input.error(Place::Byte(self.start), &found, &expected),
         }
     }
 }

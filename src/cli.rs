@@ -1,0 +1,255 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use decimate::decimate::{Boundary, Options, Placement, Targets, TierChoice};
+use decimate::io::Format;
+use decimate::mesh::Tier;
+
+/// Reduces triangle meshes by quadric edge collapse on the directed-edge data structure, keeping
+/// shape, boundary and topology.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    max_term_width = 100,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    override_usage = "decimate INPUT -o OUTPUT [--ratio R] [--triangles N] [--max-error E] [OPTIONS]\n       \
+                      decimate info MESH [--json]",
+    after_help = "Exit status: 0 done (also when stopped short, which is said), 1 a file or mesh could not be \
+                  processed, 2 wrong usage, 3 stopped short under --strict.\n\n\
+                  Examples:\n  \
+                  decimate bunny.obj -o small.ply --ratio 0.1\n  \
+                  decimate scan.ply -o small.ply --triangles 50000 --tier small\n  \
+                  decimate part.stl -o part.ply --max-error 0.05"
+)]
+pub struct Cli {
+    /// What to do instead of decimating.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Decimation.
+    #[command(flatten)]
+    pub run: Run,
+}
+
+/// The other commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Says what is in a mesh, and what each memory tier would need.
+    Info(InfoArgs),
+}
+
+/// The arguments of `decimate info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// The mesh: PLY, OBJ, STL or OFF; - for standard input.
+    pub mesh: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// The mesh's format, where neither content nor extension says it.
+    #[arg(long, value_name = "FORMAT")]
+    pub input_format: Option<Format>,
+    /// Keep vertices at equal positions apart.
+    #[arg(long)]
+    pub no_weld: bool,
+}
+
+/// The arguments of a decimation.
+#[derive(Debug, Args)]
+pub struct Run {
+    /// The mesh to decimate: PLY, OBJ, STL or OFF; - for standard input.
+    #[arg(required = true)]
+    pub input: Option<PathBuf>,
+    /// The file to write, by its extension; - for standard output.
+    #[arg(short, long, required = true)]
+    pub output: Option<PathBuf>,
+
+    /// The fraction of the triangles to KEEP: 0.1 keeps a tenth.
+    #[arg(
+        long,
+        value_name = "R",
+        help_heading = "Targets (the first that is reached stops)"
+    )]
+    pub ratio: Option<f64>,
+    /// The number of triangles to keep.
+    #[arg(
+        long,
+        value_name = "N",
+        help_heading = "Targets (the first that is reached stops)"
+    )]
+    pub triangles: Option<usize>,
+    /// Stop before the surface moves farther than this, in model units. An estimate, not a bound:
+    /// distances to the planes around each collapse, added up.
+    #[arg(
+        long,
+        value_name = "E",
+        help_heading = "Targets (the first that is reached stops)"
+    )]
+    pub max_error: Option<f64>,
+
+    /// What may happen to boundaries.
+    #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
+    pub boundary: BoundaryArg,
+    /// Where merged vertices go.
+    #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
+    pub placement: PlacementArg,
+    /// Keep vertices at equal positions apart (they are welded otherwise).
+    #[arg(long, help_heading = "Surface")]
+    pub no_weld: bool,
+
+    /// The memory tier. The output is the same in all of them.
+    #[arg(long, value_enum, default_value_t, help_heading = "Resources")]
+    pub tier: TierArg,
+    /// The memory that decimation may use, such as 2GB, 512MiB or a number of bytes; the memory
+    /// that is free where not given.
+    #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Resources")]
+    pub memory_limit: Option<u64>,
+    /// The threads to use; all processors where not given. The output does not depend on it.
+    #[arg(long, value_name = "N", help_heading = "Resources")]
+    pub threads: Option<usize>,
+
+    /// The input's format, where neither content nor extension says it.
+    #[arg(long, value_name = "FORMAT", help_heading = "Files")]
+    pub input_format: Option<Format>,
+    /// The output's format, where the extension does not say it.
+    #[arg(long, value_name = "FORMAT", help_heading = "Files")]
+    pub output_format: Option<Format>,
+    /// Write PLY and STL as text.
+    #[arg(long, help_heading = "Files")]
+    pub ascii: bool,
+    /// Significant digits of the numbers in text files; as many as give the same number back where
+    /// not given.
+    #[arg(long, value_name = "DIGITS", value_parser = clap::value_parser!(u8).range(1..=17), help_heading = "Files")]
+    pub precision: Option<u8>,
+
+    /// Write what was done as JSON; - for standard output.
+    #[arg(long, value_name = "FILE", help_heading = "Reports")]
+    pub report: Option<PathBuf>,
+    /// Say nothing but errors.
+    #[arg(short, long, help_heading = "Reports")]
+    pub quiet: bool,
+    /// Exit with 3 when the target could not be reached.
+    #[arg(long, help_heading = "Reports")]
+    pub strict: bool,
+    /// Verify every invariant of the mesh after every collapse (slow).
+    #[arg(long, help_heading = "Reports")]
+    pub check: bool,
+}
+
+/// `--boundary`.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum BoundaryArg {
+    /// Weigh boundary edges more than surface
+    #[default]
+    Keep,
+    /// Leave boundary vertices where they are, bit for bit
+    Lock,
+    /// Weigh boundary edges nothing
+    Free,
+}
+
+/// `--placement`.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum PlacementArg {
+    /// Where the cost is least
+    #[default]
+    Optimal,
+    /// To one of the edge's ends, bit for bit
+    Endpoint,
+}
+
+/// `--tier`.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum TierArg {
+    /// The largest that fits the memory limit
+    #[default]
+    Auto,
+    /// 68 bytes per triangle
+    Full,
+    /// 44 bytes per triangle
+    Medium,
+    /// 32 bytes per triangle
+    Small,
+}
+
+impl Run {
+    /// The library's options.
+    pub fn options(&self) -> Options {
+        Options {
+            targets: Targets {
+                ratio: self.ratio,
+                triangles: self.triangles,
+                max_error: self.max_error,
+            },
+            boundary: match self.boundary {
+                BoundaryArg::Keep => Boundary::Keep,
+                BoundaryArg::Lock => Boundary::Lock,
+                BoundaryArg::Free => Boundary::Free,
+            },
+            placement: match self.placement {
+                PlacementArg::Optimal => Placement::Optimal,
+                PlacementArg::Endpoint => Placement::Endpoint,
+            },
+            tier: match self.tier {
+                TierArg::Auto => TierChoice::Auto,
+                TierArg::Full => TierChoice::Fixed(Tier::Full),
+                TierArg::Medium => TierChoice::Fixed(Tier::Medium),
+                TierArg::Small => TierChoice::Fixed(Tier::Small),
+            },
+            memory_limit_bytes: self.memory_limit,
+            weld: !self.no_weld,
+            check: self.check,
+        }
+    }
+}
+
+/// A number of bytes: 1500000, 1.5MB (powers of 1000) or 1.5MiB (powers of 1024).
+fn parse_size(text: &str) -> Result<u64, String> {
+    let expected =
+        || format!("'{text}' is no size; a number with B, KB, MB, GB, KiB, MiB or GiB is expected");
+    let digits = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .unwrap_or(text.len());
+    let number: f64 = text[..digits].parse().map_err(|_| expected())?;
+    let unit = match text[digits..].trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kb" => 1e3,
+        "m" | "mb" => 1e6,
+        "g" | "gb" => 1e9,
+        "t" | "tb" => 1e12,
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        "tib" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        _ => return Err(expected()),
+    };
+    Ok((number * unit) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        for (text, bytes) in [
+            ("1500", 1500),
+            ("1.5MB", 1_500_000),
+            ("2 GiB", 2 << 30),
+            ("512m", 512_000_000),
+        ] {
+            assert_eq!(parse_size(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "MB", "1.2.3", "5 parsecs", "-1"] {
+            assert!(parse_size(text).is_err(), "{text}");
+        }
+    }
+}

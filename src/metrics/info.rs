@@ -1,0 +1,239 @@
+//! Counts that say what kind of mesh a file holds.
+
+use serde::Serialize;
+use smallvec::SmallVec;
+
+use crate::clean::{Cleaning, clean};
+use crate::error::Result;
+use crate::indexed_mesh::IndexedMesh;
+use crate::mesh::{EdgeId, EdgeStore, FaceId, Mesh, Opposite, Small, Tier, VertexId};
+
+/// What is in a mesh, after cleaning but for the first two numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Info {
+    /// Vertices in the file.
+    pub vertices: usize,
+    /// Triangles in the file; polygons count as their fans.
+    pub triangles: usize,
+    /// What cleaning finds.
+    #[serde(flatten)]
+    pub cleaning: Cleaning,
+    /// Pieces that share no vertex.
+    pub components: usize,
+    /// Edges of one face.
+    pub boundary_edges: usize,
+    /// Closed runs of boundary edges. A run that ends at non-manifold edges is none.
+    pub boundary_loops: usize,
+    /// Edges of three faces or more.
+    pub non_manifold_edges: usize,
+    /// Vertices on such an edge, or whose faces are not one fan.
+    pub non_manifold_vertices: usize,
+    /// Edges of two faces that run along it the same way.
+    pub inconsistent_edges: usize,
+    /// Whether all faces can be turned to agree.
+    pub is_orientable: bool,
+    /// Faces without area.
+    pub zero_area_faces: usize,
+    /// Vertices − edges + faces.
+    pub euler_characteristic: i64,
+    /// The sum of the components' handles, where the mesh is an orientable manifold.
+    pub genus: Option<i64>,
+    /// The diagonal of the bounding box, in model units.
+    pub diagonal: f64,
+    /// Bytes of the connectivity and positions in the full tier, side tables included.
+    pub full_tier_bytes: usize,
+    /// The same in the medium tier.
+    pub medium_tier_bytes: usize,
+    /// The same in the small tier.
+    pub small_tier_bytes: usize,
+}
+
+/// Counts what is in a mesh; `weld` merges equal positions first, as decimation does.
+///
+/// Linear time; memory of the small tier.
+///
+/// # Errors
+/// As [`clean`].
+pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
+    let (vertices, triangles) = (mesh.positions().len(), mesh.triangle_count());
+    let (mesh, cleaning) = clean(mesh, weld)?;
+    let diagonal = mesh.diagonal();
+    let zero_area_faces = mesh
+        .triangles()
+        .iter()
+        .map(|t| t.map(|v| mesh.positions()[v as usize].as_dvec3()))
+        .filter(|[a, b, c]| (*b - *a).cross(*c - *a).length_squared() == 0.0)
+        .count();
+    let (_, positions, mut faces, _) = mesh.into_parts();
+    let as_given = Mesh::<Small>::from_triangles(positions.len(), &faces);
+    let inconsistent_edges = as_given.same_way_pair_count();
+    let mesh = if inconsistent_edges == 0 {
+        as_given
+    } else {
+        let flip = as_given.faces_to_flip();
+        for (t, _) in faces.iter_mut().zip(&flip).filter(|(_, flip)| **flip) {
+            t.swap(1, 2);
+        }
+        Mesh::from_triangles(positions.len(), &faces)
+    };
+    let is_orientable = mesh.same_way_pair_count() == 0;
+    let edges = mesh.edges().count();
+    let boundary_edges = mesh.edges().filter(|&e| mesh.is_boundary(e)).count();
+    let boundary_loops = mesh
+        .boundary_curves()
+        .iter()
+        .filter(|c| c.is_closed)
+        .count();
+    let non_manifold_edges = mesh.non_manifold_edge_count() - mesh.same_way_pair_count();
+    let non_manifold_vertices = mesh
+        .vertices()
+        .filter(|&v| is_non_manifold(&mesh, v))
+        .count();
+    let components = components(&mesh);
+    let euler_characteristic = mesh.vertex_count() as i64 - edges as i64 + mesh.face_count() as i64;
+    let is_manifold = non_manifold_edges == 0 && non_manifold_vertices == 0;
+    // χ = 2·components − 2·genus − loops.
+    let genus = (is_manifold && is_orientable)
+        .then(|| (2 * components as i64 - boundary_loops as i64 - euler_characteristic) / 2);
+    let tables = mesh.bytes() + size_of_val(&positions[..])
+        - Tier::Small.bytes(positions.len(), faces.len());
+    let bytes = |tier: Tier| tier.bytes(positions.len(), faces.len()) + tables;
+    Ok(Info {
+        vertices,
+        triangles,
+        cleaning,
+        components,
+        boundary_edges,
+        boundary_loops,
+        non_manifold_edges,
+        non_manifold_vertices,
+        inconsistent_edges,
+        is_orientable,
+        zero_area_faces,
+        euler_characteristic,
+        genus,
+        diagonal,
+        full_tier_bytes: bytes(Tier::Full),
+        medium_tier_bytes: bytes(Tier::Medium),
+        small_tier_bytes: bytes(Tier::Small),
+    })
+}
+
+/// Whether `v` lies on an edge of three faces or more, or its faces are not one fan. Two fans that
+/// meet at an edge where their faces disagree in direction are one.
+fn is_non_manifold<S: EdgeStore>(mesh: &Mesh<S>, v: VertexId) -> bool {
+    if !mesh.is_non_manifold_vertex(v) {
+        return false;
+    }
+    let mut fans = 0usize;
+    let mut seams: SmallVec<[EdgeId; 8]> = SmallVec::new();
+    for start in mesh.fans(v) {
+        fans += 1;
+        let last = mesh.fan(start).last().unwrap_or(start);
+        for end in [start, mesh.prev(last)] {
+            match mesh.opposite(end) {
+                Opposite::NonManifold(_) if mesh.edge_star(end).len() > 2 => return true,
+                Opposite::NonManifold(_) => seams.push(mesh.canonical(end)),
+                Opposite::Edge(_) | Opposite::Boundary => {}
+            }
+        }
+    }
+    seams.sort_unstable();
+    seams.dedup();
+    // Fans are the pieces of a closed or open chain whose joints are the seams.
+    fans > seams.len().max(1) && fans != seams.len() + 1
+}
+
+/// The number of pieces joined through shared vertices.
+fn components<S: EdgeStore>(mesh: &Mesh<S>) -> usize {
+    let mut parent: Vec<u32> = (0..mesh.vertex_slots() as u32).collect();
+    fn root(parent: &mut [u32], mut v: u32) -> u32 {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    }
+    let mut pieces = mesh.vertex_count();
+    for f in mesh.faces() {
+        let [a, b, c] = FaceId::edges(f).map(|e| mesh.tail(e).index() as u32);
+        for (v, w) in [(a, b), (b, c)] {
+            let (v, w) = (root(&mut parent, v), root(&mut parent, w));
+            if v != w {
+                parent[v.max(w) as usize] = v.min(w);
+                pieces -= 1;
+            }
+        }
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes::{self, Shape};
+
+    fn of((positions, triangles): Shape) -> Info {
+        info(IndexedMesh::new(positions, triangles).unwrap(), true).unwrap()
+    }
+
+    #[test]
+    fn closed_surfaces_have_their_genus() {
+        let sphere = of(shapes::icosphere(2));
+        assert_eq!((sphere.genus, sphere.euler_characteristic), (Some(0), 2));
+        let torus = of(shapes::torus(9, 6));
+        assert_eq!((torus.genus, torus.euler_characteristic), (Some(1), 0));
+        assert_eq!((torus.boundary_edges, torus.components), (0, 1));
+    }
+
+    /// A disk has one loop and no handle.
+    #[test]
+    fn a_disk_has_one_loop() {
+        let grid = of(shapes::grid(4, 3));
+        assert_eq!(
+            (grid.boundary_edges, grid.boundary_loops, grid.genus),
+            (14, 1, Some(0))
+        );
+        assert_eq!(grid.full_tier_bytes, 60 * 24 + 16 * 20);
+    }
+
+    /// Three fins: 3 edges of three faces, their 4 vertices non-manifold, no genus.
+    #[test]
+    fn fins_are_not_manifold() {
+        let fins = of(shapes::three_fins(3));
+        assert_eq!(
+            (fins.non_manifold_edges, fins.non_manifold_vertices),
+            (3, 4)
+        );
+        assert_eq!(fins.genus, None);
+        let bow_tie = of(shapes::bow_tie());
+        assert_eq!(
+            (bow_tie.non_manifold_edges, bow_tie.non_manifold_vertices),
+            (0, 1)
+        );
+        assert_eq!(bow_tie.components, 1);
+    }
+
+    /// A Möbius strip is a manifold that has no orientation: one loop, χ = 0.
+    #[test]
+    fn a_moebius_strip_is_not_orientable() {
+        let strip = of(shapes::moebius(12));
+        assert!(!strip.is_orientable && strip.inconsistent_edges > 0);
+        assert_eq!(
+            (strip.non_manifold_edges, strip.non_manifold_vertices),
+            (0, 0)
+        );
+        assert_eq!((strip.euler_characteristic, strip.genus), (0, None));
+    }
+
+    /// One turned face: three of its edges disagree, and it can be turned back.
+    #[test]
+    fn a_turned_face_is_counted_by_its_edges() {
+        let (positions, mut triangles) = shapes::icosphere(1);
+        triangles[5].swap(0, 1);
+        let sphere = of((positions, triangles));
+        assert_eq!((sphere.inconsistent_edges, sphere.is_orientable), (3, true));
+        assert_eq!(sphere.genus, Some(0));
+    }
+}

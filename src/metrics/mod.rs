@@ -1,0 +1,5 @@
+//! What is in a mesh.
+
+mod info;
+
+pub use info::{Info, info};
