@@ -243,9 +243,9 @@ impl Memoryless {
             let mut last = None;
             let mut end = start;
             for e in mesh.fan(start) {
-                let along = geometry.from_point(point, mesh.head(e));
+                let along = geometry.vector(point, mesh.head(e));
                 let before = mesh.prev(e);
-                let normal = along.cross(geometry.from_point(point, mesh.tail(before)));
+                let normal = along.cross(geometry.vector(point, mesh.tail(before)));
                 let length = normal.length();
                 if length > 0.0 {
                     quadratic.add_outer(normal, 0.5 / length);
@@ -267,7 +267,7 @@ impl Memoryless {
                 add_fold(&mut quadratic, along, last, side);
             } else {
                 self.add_singular(&mut quadratic, mesh, start, along);
-                let along = geometry.from_point(point, mesh.tail(end));
+                let along = geometry.vector(point, mesh.tail(end));
                 self.add_singular(&mut quadratic, mesh, end, along);
             }
         }

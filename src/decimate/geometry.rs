@@ -45,14 +45,14 @@ impl Geometry {
 
     /// The vector from a stored position to `v`, in the unit box.
     #[inline(always)]
-    pub fn from_point(&self, from: Vec3, v: VertexId) -> DVec3 {
+    pub fn vector(&self, from: Vec3, v: VertexId) -> DVec3 {
         (self.position(v).as_dvec3() - from.as_dvec3()) * self.scale
     }
 
     /// The vector from one vertex to another, in the unit box.
     #[inline(always)]
     pub fn between(&self, from: VertexId, to: VertexId) -> DVec3 {
-        self.from_point(self.position(from), to)
+        self.vector(self.position(from), to)
     }
 
     /// The stored position nearest to the middle of `v` and `w` plus a vector in the unit box.
@@ -65,8 +65,8 @@ impl Geometry {
     #[inline(always)]
     pub fn normal<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> DVec3 {
         let p = self.position(mesh.tail(e));
-        self.from_point(p, mesh.head(e))
-            .cross(self.from_point(p, mesh.apex(e)))
+        self.vector(p, mesh.head(e))
+            .cross(self.vector(p, mesh.apex(e)))
     }
 
     /// The bytes that the positions hold.

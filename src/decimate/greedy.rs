@@ -27,7 +27,8 @@ pub struct Stop {
 pub struct Tally {
     /// Collapses done.
     pub collapses: usize,
-    /// Of these, the ones with a non-manifold vertex at an end.
+    /// Of these, the ones that touched something non-manifold: a vertex at an end of the edge or
+    /// across from it in a dying face.
     pub collapses_non_manifold: usize,
     /// Refusals because the topology would have changed.
     pub rejected_link: usize,
@@ -56,7 +57,7 @@ pub struct Greedy<'a, S, C, Q> {
     cost: C,
     queue: Q,
     /// One flag a vertex that must not move, or nothing where all may.
-    locked: &'a [bool],
+    locked: Vec<bool>,
     /// One flag a face that counts as two, or nothing where none does.
     double_sided: &'a [bool],
     /// An estimate of how far each vertex is from the original, in the unit box.
@@ -76,7 +77,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         mesh: &'a mut Mesh<S>,
         geometry: &'a mut Geometry,
         cost: C,
-        locked: &'a [bool],
+        locked: Vec<bool>,
         double_sided: &'a [bool],
     ) -> Self {
         let slots = mesh.vertex_slots();
@@ -229,15 +230,18 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
 
     fn collapse(&mut self, e: EdgeId, position: Vec3) -> Collapse {
         let ends = self.mesh.edge_vertices(e);
-        if ends
-            .into_iter()
-            .any(|v| self.mesh.is_non_manifold_vertex(v))
-        {
+        let star = self.mesh.edge_star(e);
+        let apexes = star.iter().map(|&d| self.mesh.apex(d));
+        let mut touched = ends.into_iter().chain(apexes);
+        if touched.any(|v| self.mesh.is_non_manifold_vertex(v)) {
             self.tally.collapses_non_manifold += 1;
         }
         let deviation = self.deviation_after(e, position);
         let collapse = self.mesh.collapse(e);
         self.geometry.set_position(collapse.kept, position);
+        if self.is_locked(collapse.removed) {
+            self.locked[collapse.kept.index()] = true;
+        }
         self.deviation[collapse.kept.index()] = deviation as f32;
         let sides = |f: &FaceId| {
             if self.double_sided.get(f.index()) == Some(&true) {

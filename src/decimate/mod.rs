@@ -147,7 +147,7 @@ fn run<S: EdgeStore>(
     let cost = Memoryless::new(&mesh, &geometry, options.boundary, options.placement);
     let scale = geometry.scale();
     let mut greedy =
-        Greedy::<_, _, LazyHeap>::new(&mut mesh, &mut geometry, cost, &locked, &double_sided);
+        Greedy::<_, _, LazyHeap>::new(&mut mesh, &mut geometry, cost, locked, &double_sided);
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),

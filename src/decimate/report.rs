@@ -64,7 +64,8 @@ pub struct Report {
     pub blocked: Option<Blocked>,
     /// Collapses done.
     pub collapses: usize,
-    /// Of these, the ones with a non-manifold vertex at an end.
+    /// Of these, the ones that touched something non-manifold: a vertex at an end of the edge or
+    /// across from it in a dying face.
     pub collapses_non_manifold: usize,
     /// Times a candidate was refused because the topology would have changed.
     pub rejected_link: usize,

@@ -40,14 +40,10 @@ pub fn turns_a_face<S: EdgeStore>(
         let (a, b) = (mesh.head(d), mesh.apex(d));
         let rim = geometry.between(a, b);
         let corner = geometry.position(mesh.tail(d));
-        let before = shape(
-            geometry.from_point(corner, a),
-            geometry.from_point(corner, b),
-            rim,
-        );
+        let before = shape(geometry.vector(corner, a), geometry.vector(corner, b), rim);
         let after = shape(
-            geometry.from_point(position, a),
-            geometry.from_point(position, b),
+            geometry.vector(position, a),
+            geometry.vector(position, b),
             rim,
         );
         match (before, after) {
@@ -89,8 +85,8 @@ pub fn distance_from_star<S: EdgeStore>(
         let point = geometry.position(v);
         let offset = (position.as_dvec3() - point.as_dvec3()) * geometry.scale();
         for d in mesh.outgoing_edges(v) {
-            let to_head = geometry.from_point(point, mesh.head(d));
-            let to_apex = geometry.from_point(point, mesh.apex(d));
+            let to_head = geometry.vector(point, mesh.head(d));
+            let to_apex = geometry.vector(point, mesh.apex(d));
             let normal = to_head.cross(to_apex);
             let length = normal.length();
             if length > 0.0 {

@@ -58,8 +58,8 @@ impl<S: EdgeStore> Mesh<S> {
     }
 
     fn find_fans(&mut self) {
-        let mut seen = vec![false; self.store.len()];
-        for e in (0..self.store.len()).map(EdgeId::new) {
+        let mut seen = vec![false; self.store.slots()];
+        for e in (0..self.store.slots()).map(EdgeId::new) {
             if seen[e.index()] || self.store.opposite_word(e).is_dead() {
                 continue;
             }

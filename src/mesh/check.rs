@@ -33,7 +33,7 @@ impl<S: EdgeStore> Mesh<S> {
         }
         let rebuilt = Mesh::<S>::from_triangles(self.vertex_slots(), &triangles);
         let old = |e: EdgeId| slots[e.face().index()].edges()[e.index() % 3];
-        for e in (0..rebuilt.store.len()).map(EdgeId::new) {
+        for e in (0..rebuilt.store.slots()).map(EdgeId::new) {
             self.check_edge(&rebuilt, e, old)?;
         }
         let mut fans = (Vec::new(), Vec::new());

@@ -196,7 +196,7 @@ impl<S: EdgeStore> Mesh<S> {
 
     /// The number of face slots, dead ones included.
     pub fn face_slots(&self) -> usize {
-        self.store.len() / 3
+        self.store.slots() / 3
     }
 
     /// The number of vertex slots, dead ones included.

@@ -194,13 +194,13 @@ impl<S: EdgeStore> Mesh<S> {
                 .flat_map(FaceId::edges)
                 .filter(|&e| self.is_boundary(e))
         };
-        let mut has_previous = vec![false; self.store.len()];
+        let mut has_previous = vec![false; self.store.slots()];
         for e in boundary() {
             if let Some(next) = self.next_on_boundary(e) {
                 has_previous[next.index()] = true;
             }
         }
-        let mut seen = vec![false; self.store.len()];
+        let mut seen = vec![false; self.store.slots()];
         let mut curves = Vec::new();
         // Runs from their first edges; what is left then lies on loops.
         for from_first in [true, false] {

@@ -35,7 +35,7 @@ impl EdgeStore for Full {
     }
 
     #[inline(always)]
-    fn len(&self) -> usize {
+    fn slots(&self) -> usize {
         self.0.len()
     }
 

@@ -32,7 +32,7 @@ impl EdgeStore for Medium {
     }
 
     #[inline(always)]
-    fn len(&self) -> usize {
+    fn slots(&self) -> usize {
         self.0.len()
     }
 

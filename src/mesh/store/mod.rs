@@ -70,7 +70,7 @@ pub trait EdgeStore: Clone + Send + Sync + Sized {
     fn from_triangles(triangles: &[[u32; 3]]) -> Self;
 
     /// The directed edges, dead ones included.
-    fn len(&self) -> usize;
+    fn slots(&self) -> usize;
 
     /// The vertex that `e` starts at.
     fn tail(&self, e: EdgeId) -> VertexId;

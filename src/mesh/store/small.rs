@@ -30,7 +30,7 @@ impl EdgeStore for Small {
     }
 
     #[inline(always)]
-    fn len(&self) -> usize {
+    fn slots(&self) -> usize {
         self.0.len()
     }
 
