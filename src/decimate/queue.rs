@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use binary_heap_plus::{BinaryHeap, FnComparator};
+use binary_heap_plus::{BinaryHeap, MinComparator};
 
 use crate::mesh::EdgeId;
 
@@ -17,12 +17,23 @@ pub struct Candidate {
     pub evaluated_at: u32,
 }
 
-impl Candidate {
-    /// By cost, then by edge: a total order that depends on nothing else.
-    fn order(&self, other: &Self) -> Ordering {
-        self.cost
-            .total_cmp(&other.cost)
+impl Eq for Candidate {}
+
+/// By cost, then by edge: a total order of the edges that depends on nothing else.
+impl Ord for Candidate {
+    #[inline]
+    fn cmp(&self, other: &Self) -> Ordering {
+        let by_cost = self.cost.total_cmp(&other.cost);
+        by_cost
             .then(self.edge.cmp(&other.edge))
+            .then(self.evaluated_at.cmp(&other.evaluated_at))
+    }
+}
+
+impl PartialOrd for Candidate {
+    #[inline]
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
 }
 
@@ -47,21 +58,13 @@ pub trait Queue: Sync {
     fn bytes(&self) -> usize;
 }
 
-type Cheapest = FnComparator<fn(&Candidate, &Candidate) -> Ordering>;
-
 /// A binary heap in which a changed candidate is pushed again and the old one stays until it is
 /// popped or dropped: for costs that may fall.
-pub struct LazyHeap(BinaryHeap<Candidate, Cheapest>);
-
-impl LazyHeap {
-    fn comparator() -> Cheapest {
-        FnComparator(|a, b| b.order(a))
-    }
-}
+pub struct LazyHeap(BinaryHeap<Candidate, MinComparator>);
 
 impl Queue for LazyHeap {
     fn from_candidates(candidates: Vec<Candidate>) -> Self {
-        Self(BinaryHeap::from_vec_cmp(candidates, Self::comparator()))
+        Self(BinaryHeap::from_vec(candidates))
     }
 
     #[inline]
@@ -79,8 +82,7 @@ impl Queue for LazyHeap {
     }
 
     fn retain(&mut self, keep: impl FnMut(&Candidate) -> bool) {
-        let empty = BinaryHeap::from_vec_cmp(Vec::new(), Self::comparator());
-        let mut candidates = std::mem::replace(&mut self.0, empty).into_vec();
+        let mut candidates = std::mem::replace(&mut self.0, BinaryHeap::new_min()).into_vec();
         candidates.retain(keep);
         *self = Self::from_candidates(candidates);
     }
