@@ -163,18 +163,20 @@ impl Factor {
     fn of(m: &Symmetric, ridge: f64) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz] = m.0;
         let d0 = xx + ridge;
-        let l10 = xy / d0;
-        let l20 = xz / d0;
+        let inverse_d0 = d0.recip();
+        let l10 = xy * inverse_d0;
+        let l20 = xz * inverse_d0;
         let d1 = yy + ridge - l10 * xy;
+        let inverse_d1 = d1.recip();
         let s21 = yz - l20 * xy;
-        let l21 = s21 / d1;
+        let l21 = s21 * inverse_d1;
         let d2 = zz + ridge - l20 * xz - l21 * s21;
-        let positive = d0 > 0.0 && d1 > 0.0 && d2 > 0.0;
-        positive.then(|| Self {
+        let is_positive = d0 > 0.0 && d1 > 0.0 && d2 > 0.0;
+        is_positive.then(|| Self {
             l10,
             l20,
             l21,
-            inverse_d: DVec3::new(d0, d1, d2).recip(),
+            inverse_d: DVec3::new(inverse_d0, inverse_d1, d2.recip()),
         })
     }
 
@@ -343,7 +345,8 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         let b = quadratic_v.times(half) - quadratic_w.times(half);
         let at_middle = half.dot(m.times(half));
         let energy = |y: DVec3| y.dot(m.times(y)) - 2.0 * b.dot(y) + at_middle;
-        let (energy_v, energy_w) = (energy(half), energy(-half));
+        let at_half = b.dot(half);
+        let (energy_v, energy_w) = (2.0 * (at_middle - at_half), 2.0 * (at_middle + at_half));
         let length_squared = 4.0 * half.length_squared();
 
         let ends = match held {
