@@ -70,6 +70,7 @@ pub struct Run {
     #[arg(
         long,
         value_name = "R",
+        allow_negative_numbers = true,
         help_heading = "Targets (the first that is reached stops)"
     )]
     pub ratio: Option<f64>,
@@ -77,6 +78,7 @@ pub struct Run {
     #[arg(
         long,
         value_name = "N",
+        allow_negative_numbers = true,
         help_heading = "Targets (the first that is reached stops)"
     )]
     pub triangles: Option<usize>,
@@ -85,6 +87,7 @@ pub struct Run {
     #[arg(
         long,
         value_name = "E",
+        allow_negative_numbers = true,
         help_heading = "Targets (the first that is reached stops)"
     )]
     pub max_error: Option<f64>,

@@ -3,8 +3,7 @@
 
 mod cli;
 
-use std::fs::File;
-use std::io::{BufWriter, IsTerminal, Write};
+use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
@@ -51,11 +50,17 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
             "-o - and --report - would both write to standard output".into(),
         ));
     }
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()
-            .map_err(|error| Error::InvalidOptions(format!("--threads {threads}: {error}")))?;
+    use_threads(args.threads)?;
+    if let Some(report) = &args.report {
+        for other in [input, output] {
+            if is_same_file(report, other) {
+                return Err(Error::InvalidOptions(format!(
+                    "--report {} would overwrite the mesh of that name",
+                    report.display()
+                )));
+            }
+        }
+        io::check_place(report)?;
     }
     let options = args.options();
     options.targets.triangles_of(0)?;
@@ -65,6 +70,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
         precision: args.precision.map(usize::from),
     };
     io::output_format(output, &write_options)?;
+    io::check_place(output)?;
 
     let start = Instant::now();
     let mesh = io::read(input, args.input_format)?;
@@ -103,9 +109,33 @@ fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
     if args.json {
         write_json(Path::new("-"), &info)?;
     } else {
-        to_stdout(table(&info).as_bytes())?;
+        io::write_file(Path::new("-"), |out| out.write_all(table(&info).as_bytes()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Sets the number of threads; more than eight a processor would only cost their stacks.
+fn use_threads(threads: Option<usize>) -> Result<(), Error> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.min(8 * processors))
+        .build_global()
+        .map_err(|error| Error::InvalidOptions(format!("--threads {threads}: {error}")))
+}
+
+/// Whether two paths name one file; neither need be there yet.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        path.canonicalize().ok().or_else(|| {
+            let folder = path.parent().filter(|p| *p != Path::new(""));
+            let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+            Some(folder.join(path.file_name()?))
+        })
+    };
+    a != Path::new("-") && place(a).is_some_and(|a| place(b) == Some(a))
 }
 
 /// An error about a mesh, with the name of the file it came from.
@@ -135,33 +165,11 @@ fn advance(bar: &ProgressBar, progress: Progress) {
     bar.set_position((progress.triangles_start - progress.triangles) as u64);
 }
 
-fn to_stdout(bytes: &[u8]) -> Result<(), Error> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(bytes)
-        .and_then(|()| out.flush())
-        .map_err(|source| Error::Io {
-            path: "<stdout>".into(),
-            action: "cannot write",
-            source,
-        })
-}
-
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
     let mut text = serde_json::to_string_pretty(value)
         .map_err(|error| Error::Internal(format!("cannot write JSON: {error}")))?;
     text.push('\n');
-    if path == Path::new("-") {
-        return to_stdout(text.as_bytes());
-    }
-    let failed = |source| Error::Io {
-        path: path.into(),
-        action: "cannot write",
-        source,
-    };
-    let mut file = BufWriter::new(File::create(path).map_err(failed)?);
-    file.write_all(text.as_bytes())
-        .and_then(|()| file.flush())
-        .map_err(failed)
+    io::write_file(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// What was done, in a few lines for a person.

@@ -310,7 +310,7 @@ fn what_cannot_be_read_or_written_is_1_and_named() {
         ("folder.ply -o out.ply --ratio 0.5", "folder.ply: "),
         (
             "sample.ply -o folder.ply --ratio 0.9",
-            "folder.ply: cannot write",
+            "folder.ply: cannot create",
         ),
         (
             "sample.ply -o absent/out.ply --ratio 0.9",
@@ -325,6 +325,58 @@ fn what_cannot_be_read_or_written_is_1_and_named() {
     ] {
         folder.run(arguments).failed(1, needle);
     }
+}
+
+/// Where nothing can be written, that is said before the input is read.
+#[test]
+fn an_output_that_cannot_be_is_refused_before_the_work() {
+    let folder = Folder::with(&[]);
+    for arguments in [
+        "missing.ply -o absent/out.ply --ratio 0.5",
+        "missing.ply -o out.ply --ratio 0.5 --report absent/r.json",
+    ] {
+        folder.run(arguments).failed(1, "cannot create");
+    }
+}
+
+/// A report in the place of a mesh would destroy it.
+#[test]
+fn a_report_overwrites_no_mesh() {
+    let folder = Folder::with(&["tetrahedron.off"]);
+    let before = folder.bytes("tetrahedron.off");
+    for report in [
+        "tetrahedron.off",
+        "./tetrahedron.off",
+        "out.off",
+        "../x/../out.off",
+    ] {
+        let report = report.replace("../x/..", folder.0.path().to_str().unwrap());
+        let arguments = format!("tetrahedron.off -o out.off --ratio 1 --report {report}");
+        folder.run(&arguments).failed(2, "would overwrite");
+    }
+    assert_eq!(folder.bytes("tetrahedron.off"), before);
+}
+
+/// A thread has a stack; ten thousand of them would be the longest part of the work.
+#[test]
+fn any_number_of_threads_is_accepted() {
+    let folder = Folder::with(&["tetrahedron.off"]);
+    let ran = folder.run("tetrahedron.off -o out.off --ratio 1 --threads 100000");
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+}
+
+#[test]
+fn negative_targets_are_named_as_such() {
+    let folder = Folder::with(&["tetrahedron.off"]);
+    folder
+        .run("tetrahedron.off -o out.off --ratio -0.5")
+        .failed(2, "ratio -0.5");
+    folder
+        .run("tetrahedron.off -o out.off --max-error -1")
+        .failed(2, "error -1");
+    folder
+        .run("tetrahedron.off -o out.off --triangles -3")
+        .failed(2, "'-3'");
 }
 
 /// No edge of a tetrahedron may go. That is said, with the reason; only `--strict` makes it a failure.

@@ -191,22 +191,34 @@ impl Factor {
     }
 }
 
-/// The memoryless, volume-constrained cost.
-pub struct Memoryless {
-    tensors: Vec<Tensor>,
-    /// How many changes around a vertex pass before its tensor is computed again: none below
-    /// [`BUSY`] faces, and a share of its faces above, so that a vertex of valence 100 000 does not
-    /// cost 100 000 faces for each collapse on its rim.
-    patience: Vec<u16>,
-    boundary_weight: f64,
-    placement: Placement,
+/// How far a busy vertex's tensor may lag behind the faces around it, so that a vertex of valence
+/// 100 000 does not cost 100 000 faces for each collapse on its rim.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lag {
+    /// The changes around the vertex that pass before its tensor is computed again: one for every
+    /// [`BUSY`] faces, none below.
+    every: u16,
+    /// How many of them are left.
+    left: u16,
 }
 
 /// A vertex with this many faces or more may lag behind by one in as many of them.
 const BUSY: usize = 24;
 
+/// A vertex that lags by this many changes (with 192 faces or more) stays where it is when a
+/// collapse takes a neighbour in: moving it would turn faces all around it.
+const HEAVY: u16 = 8;
+
+/// The memoryless, volume-constrained cost.
+pub struct Memoryless {
+    tensors: Vec<Tensor>,
+    lag: Vec<Lag>,
+    boundary_weight: f64,
+    placement: Placement,
+}
+
 impl Memoryless {
-    /// The model's state for a mesh, computed in parallel: 38 bytes a vertex.
+    /// The model's state for a mesh, computed in parallel: 40 bytes a vertex.
     pub fn new<S: EdgeStore>(
         mesh: &Mesh<S>,
         geometry: &Geometry,
@@ -220,22 +232,22 @@ impl Memoryless {
         let slots = mesh.vertex_slots();
         let mut model = Self {
             tensors: Vec::new(),
-            patience: vec![0; slots],
+            lag: vec![Lag::default(); slots],
             boundary_weight,
             placement,
         };
-        let tensor = |v| model.tensor(mesh, geometry, VertexId::new(v)).0;
-        model.tensors = (0..slots).into_par_iter().map(tensor).collect();
+        let tensor = |v| model.tensor(mesh, geometry, VertexId::new(v));
+        (model.tensors, model.lag) = (0..slots).into_par_iter().map(tensor).unzip();
         model
     }
 
-    /// The tensor of `v` from the faces around it now, and their number.
+    /// The tensor of `v` from the faces around it now, and how far it may lag behind them.
     fn tensor<S: EdgeStore>(
         &self,
         mesh: &Mesh<S>,
         geometry: &Geometry,
         v: VertexId,
-    ) -> (Tensor, usize) {
+    ) -> (Tensor, Lag) {
         let point = geometry.position(v);
         let mut quadratic = Symmetric::default();
         let mut area = DVec3::ZERO;
@@ -277,7 +289,8 @@ impl Memoryless {
             quadratic: quadratic.0.map(|x| x as f32),
             area: area.as_vec3().to_array(),
         };
-        (tensor, faces)
+        let every = (faces / BUSY).min(u16::MAX.into()) as u16;
+        (tensor, Lag { every, left: every })
     }
 
     /// Adds the line of a boundary or non-manifold edge; the latter ends several fans and is added
@@ -300,10 +313,7 @@ impl Memoryless {
     }
 
     fn refresh<S: EdgeStore>(&mut self, mesh: &Mesh<S>, geometry: &Geometry, v: VertexId) {
-        let (tensor, faces) = self.tensor(mesh, geometry, v);
-        self.tensors[v.index()] = tensor;
-        let patience = if faces < BUSY { 0 } else { faces / BUSY };
-        self.patience[v.index()] = patience.min(u16::MAX.into()) as u16;
+        (self.tensors[v.index()], self.lag[v.index()]) = self.tensor(mesh, geometry, v);
     }
 }
 
@@ -349,6 +359,12 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         let (energy_v, energy_w) = (2.0 * (at_middle - at_half), 2.0 * (at_middle + at_half));
         let length_squared = 4.0 * half.length_squared();
 
+        let heavy = [v, w].map(|v| self.lag[v.index()].every >= HEAVY);
+        let held = if held == [false; 2] && heavy != [true; 2] {
+            heavy
+        } else {
+            held
+        };
         let ends = match held {
             [true, true] => return None,
             [true, false] => (energy_v, geometry.position(v)),
@@ -394,13 +410,19 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         changed.clear();
         changed.push(collapse.kept);
         self.refresh(mesh, geometry, collapse.kept);
-        mesh.for_each_neighbour(collapse.kept, |x| {
-            let patience = &mut self.patience[x.index()];
-            if *patience > 0 {
-                *patience -= 1;
-            } else {
-                changed.push(x);
-            }
+        changed.extend(mesh.neighbours(collapse.kept));
+        if mesh.is_non_manifold_vertex(collapse.kept) {
+            // A vertex where many fans end is met once for each.
+            changed[1..].sort_unstable();
+            changed.dedup();
+        }
+        let mut is_first = true;
+        changed.retain(|x| {
+            let lag = &mut self.lag[x.index()];
+            let waits = lag.left > 0 && !is_first;
+            lag.left -= u16::from(waits);
+            is_first = false;
+            !waits
         });
         for &x in &changed[1..] {
             self.refresh(mesh, geometry, x);
@@ -408,18 +430,21 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     }
 
     fn bytes(&self) -> usize {
-        self.tensors.capacity() * size_of::<Tensor>() + self.patience.capacity() * size_of::<u16>()
+        self.tensors.capacity() * size_of::<Tensor>() + self.lag.capacity() * size_of::<Lag>()
     }
 }
 
 impl Memoryless {
-    /// The sum of the normals around both ends, the faces at `e` counted once.
+    /// The sum of the normals around both ends, the faces at `e` counted once; nothing at a
+    /// non-manifold edge, which encloses no one volume.
     fn area_around<S: EdgeStore>(&self, mesh: &Mesh<S>, geometry: &Geometry, e: EdgeId) -> DVec3 {
         let [v, w] = mesh.edge_vertices(e);
-        let at = |v: VertexId| self.tensors[v.index()].area();
-        mesh.edge_star(e)
-            .iter()
-            .fold(at(v) + at(w), |sum, &d| sum - geometry.normal(mesh, d))
+        let around = self.tensors[v.index()].area() + self.tensors[w.index()].area();
+        match mesh.opposite(e) {
+            Opposite::Edge(o) => around - geometry.normal(mesh, e) - geometry.normal(mesh, o),
+            Opposite::Boundary => around - geometry.normal(mesh, e),
+            Opposite::NonManifold(_) => DVec3::ZERO,
+        }
     }
 }
 

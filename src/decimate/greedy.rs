@@ -42,6 +42,9 @@ pub struct Tally {
     pub bytes: usize,
 }
 
+/// The faces whose edges are evaluated at a time, in parallel.
+const BLOCK_FACES: usize = 1 << 16;
+
 /// Why a candidate cannot be collapsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Rejection {
@@ -97,14 +100,20 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             tally: Tally::default(),
         };
         let this = &greedy;
-        let candidates: Vec<Candidate> = (0..this.mesh.face_slots())
-            .into_par_iter()
-            .map(FaceId::new)
-            .filter(|&f| this.mesh.is_live_face(f))
-            .flat_map_iter(|f| f.edges().into_iter())
-            .filter(|&e| this.mesh.canonical(e) == e)
-            .filter_map(|e| this.candidate(e))
-            .collect();
+        // In blocks, so that no second copy of all candidates is held.
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(3 * this.mesh.face_count() / 2);
+        let slots = this.mesh.face_slots();
+        for first in (0..slots).step_by(BLOCK_FACES) {
+            let block: Vec<Candidate> = (first..slots.min(first + BLOCK_FACES))
+                .into_par_iter()
+                .map(FaceId::new)
+                .filter(|&f| this.mesh.is_live_face(f))
+                .flat_map_iter(|f| f.edges().into_iter())
+                .filter(|&e| this.mesh.canonical(e) == e)
+                .filter_map(|e| this.candidate(e))
+                .collect();
+            candidates.extend(block);
+        }
         greedy.tally.rejected_lock = greedy.locked_edges();
         greedy.queue = Q::from_candidates(candidates);
         greedy

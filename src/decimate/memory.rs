@@ -9,7 +9,7 @@ use crate::mesh::Tier;
 /// deviations and the queue.
 pub fn needed_bytes(tier: Tier, vertices: usize, triangles: usize) -> u64 {
     let building = 12 * triangles + 15 * triangles + 4 * vertices;
-    let collapsing = 46 * vertices + 36 * triangles;
+    let collapsing = 48 * vertices + 36 * triangles;
     (tier.bytes(vertices, triangles) + building.max(collapsing)) as u64
 }
 

@@ -15,7 +15,7 @@ use std::time::Instant;
 use crate::clean::{Cleaning, clean};
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
-use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Small, Tier};
+use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
 pub use options::{Boundary, Options, Placement, Targets, TierChoice};
@@ -132,7 +132,11 @@ fn run<S: EdgeStore>(
     let start = Instant::now();
     let diagonal = input.diagonal();
     let (origin, positions, triangles, mut double_sided) = input.into_parts();
-    let (mut mesh, mut flipped) = build::<S>(positions.len(), triangles);
+    let Oriented {
+        mut mesh,
+        mut flipped,
+        ..
+    } = Mesh::<S>::oriented(positions.len(), triangles);
     let mut geometry = Geometry::new(positions, diagonal);
     report.mesh_bytes = mesh.bytes() + geometry.bytes();
     report.non_manifold_edges_in = mesh.non_manifold_edge_count();
@@ -195,29 +199,6 @@ fn run<S: EdgeStore>(
         IndexedMesh::with_origin(origin, positions, triangles)?.with_double_sided(double_sided)?;
     report.decimate_seconds = start.elapsed().as_secs_f64();
     Ok(output)
-}
-
-/// The connectivity of these triangles, neighbours turned to agree where they can, and which faces
-/// were turned (nothing where none).
-fn build<S: EdgeStore>(vertices: usize, mut triangles: Vec<[u32; 3]>) -> (Mesh<S>, Vec<bool>) {
-    let mesh = Mesh::<S>::from_triangles(vertices, &triangles);
-    if mesh.same_way_pair_count() == 0 {
-        return (mesh, Vec::new());
-    }
-    let flipped = mesh.faces_to_flip();
-    drop(mesh);
-    turn_round(&mut triangles, &flipped);
-    (Mesh::from_triangles(vertices, &triangles), flipped)
-}
-
-fn turn_round(triangles: &mut [[u32; 3]], flipped: &[bool]) {
-    for (triangle, _) in triangles
-        .iter_mut()
-        .zip(flipped)
-        .filter(|(_, flipped)| **flipped)
-    {
-        triangle.swap(1, 2);
-    }
 }
 
 /// A flag for each vertex that lies on a boundary edge.

@@ -9,34 +9,17 @@ use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite};
 /// precision could vouch for.
 const THIN: f64 = 1e-6;
 
-/// The faces that survive the collapse of `e`, each by its outgoing edge from a moving end.
-fn surviving_faces<'a, S: EdgeStore>(
-    mesh: &'a Mesh<S>,
-    e: EdgeId,
-) -> impl Iterator<Item = EdgeId> + 'a {
-    let [v, w] = mesh.edge_vertices(e);
-    let survives =
-        move |mesh: &Mesh<S>, d: EdgeId, other| mesh.head(d) != other && mesh.apex(d) != other;
-    let at_v = mesh
-        .outgoing_edges(v)
-        .filter(move |&d| survives(mesh, d, w));
-    let at_w = mesh
-        .outgoing_edges(w)
-        .filter(move |&d| survives(mesh, d, v));
-    at_v.chain(at_w)
-}
-
 /// Whether a face would turn by 90° or more, or lose its area, if the ends of `e` moved to
 /// `position`.
 ///
-/// Costs one walk around each end.
+/// Costs one walk around each end that moves, in turns, until a face is found.
 pub fn turns_a_face<S: EdgeStore>(
     mesh: &Mesh<S>,
     geometry: &Geometry,
     e: EdgeId,
     position: Vec3,
 ) -> bool {
-    surviving_faces(mesh, e).any(|d| {
+    let turns = |d: EdgeId| {
         let (a, b) = (mesh.head(d), mesh.apex(d));
         let rim = geometry.between(a, b);
         let corner = geometry.position(mesh.tail(d));
@@ -51,7 +34,21 @@ pub fn turns_a_face<S: EdgeStore>(
             (Some(_), None) => true,
             (Some(before), Some(after)) => before.dot(after) <= 0.0,
         }
-    })
+    };
+    let [v, w] = mesh.edge_vertices(e);
+    let mut faces = [(v, w), (w, v)].map(|(end, other)| {
+        let moves = geometry.position(end) != position;
+        let survives = move |&d: &EdgeId| mesh.head(d) != other && mesh.apex(d) != other;
+        mesh.outgoing_edges(end)
+            .filter(move |d| moves && survives(d))
+    });
+    loop {
+        match [faces[0].next(), faces[1].next()] {
+            [None, None] => return false,
+            next if next.into_iter().flatten().any(turns) => return true,
+            _ => {}
+        }
+    }
 }
 
 /// The normal of a triangle given by its sides, unless it is too thin to have one.
@@ -83,6 +80,9 @@ pub fn distance_from_star<S: EdgeStore>(
     let mut planes = 0.0f64;
     for v in mesh.edge_vertices(e) {
         let point = geometry.position(v);
+        if point == position {
+            continue;
+        }
         let offset = (position.as_dvec3() - point.as_dvec3()) * geometry.scale();
         for d in mesh.outgoing_edges(v) {
             let to_head = geometry.vector(point, mesh.head(d));

@@ -447,25 +447,52 @@ fn a_sphere_is_near_its_limit() {
     );
 }
 
-/// A vertex of valence 20 000 does not cost its valence at every collapse on the rim.
+/// A vertex of valence 20 000 does not cost its valence at every collapse on the rim, nor at every
+/// spoke that is refused: with an even rim, and with a jagged one.
 #[test]
 fn a_busy_vertex_takes_no_quadratic_time() {
     let n = 20_000u32;
-    let rim = (0..n).map(|i| {
-        let angle = f64::from(i) / f64::from(n) * std::f64::consts::TAU;
-        let radius = 1.0 + 0.01 * (17.0 * angle).sin();
-        Vec3::new(
-            (radius * angle.cos()) as f32,
-            (radius * angle.sin()) as f32,
-            0.0,
-        )
-    });
-    let positions: Vec<Vec3> = std::iter::once(Vec3::new(0.0, 0.0, 0.5))
-        .chain(rim)
-        .collect();
-    let triangles = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
-    let (_, report) = decimate(mesh((positions, triangles)), &to_triangles(200)).unwrap();
-    assert_eq!(report.triangles_out, 200);
+    for (jag, height) in [(0.01, 0.5), (0.3, 0.0)] {
+        let rim = (0..n).map(|i| {
+            let angle = f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+            let radius = 1.0 + jag * (f64::from(i * 7919 % 101) / 101.0);
+            Vec3::new(
+                (radius * angle.cos()) as f32,
+                (radius * angle.sin()) as f32,
+                0.0,
+            )
+        });
+        let hub = Vec3::new(0.0, 0.0, height);
+        let positions: Vec<Vec3> = std::iter::once(hub).chain(rim).collect();
+        let triangles = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
+        let (_, report) = decimate(mesh((positions, triangles)), &to_triangles(10_000)).unwrap();
+        assert_eq!(report.triangles_out, 10_000);
+    }
+}
+
+/// A book of 500 pages on one edge: the vertices of the spine are met once, not once a page.
+#[test]
+fn a_busy_edge_takes_no_cubic_time() {
+    let pages = 500u32;
+    let mut positions = vec![Vec3::ZERO, Vec3::Z];
+    let mut triangles = Vec::new();
+    for page in 0..pages {
+        let angle = f64::from(page) / f64::from(pages) * std::f64::consts::TAU;
+        let (x, y) = (angle.cos() as f32, angle.sin() as f32);
+        let a = positions.len() as u32;
+        positions.extend([0.0, 1.0].map(|z| Vec3::new(x, y, z)));
+        positions.push(Vec3::new(0.5 * x, 0.5 * y, 0.6));
+        let middle = a + 2;
+        triangles.extend([
+            [0, a, middle],
+            [a, a + 1, middle],
+            [a + 1, 1, middle],
+            [1, 0, middle],
+        ]);
+    }
+    let (small, report) = decimate(mesh((positions, triangles)), &to_triangles(500)).unwrap();
+    assert_eq!(small.triangle_count(), report.triangles_out);
+    assert_eq!(report.triangles_out, 500);
 }
 
 #[test]

@@ -27,6 +27,8 @@ use std::str::FromStr;
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
 
+pub use output::{check_place, write_file};
+
 use input::Input;
 
 /// A mesh file format.
@@ -141,10 +143,10 @@ pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<
     })
 }
 
-/// The format that [`write`] would write to `path`: to be asked before the work that fills it.
+/// The format that [`write()`] would write to `path`: to be asked before the work that fills it.
 ///
 /// # Errors
-/// As [`write`]'s [`Error::InvalidOptions`].
+/// As [`write()`]'s [`Error::InvalidOptions`].
 pub fn output_format(path: &Path, options: &WriteOptions) -> Result<Format> {
     let format = match options.format {
         Some(format) => format,

@@ -12,11 +12,12 @@ use super::text::write_number;
 /// How much is written at a time.
 const BLOCK_BYTES: usize = 1 << 20;
 
-/// Has `write` fill the file at `path`, or standard output where that is `-`.
-pub(super) fn write_file(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<()> {
+/// Has `write` fill the file at `path`, or standard output where that is `-`: under another name
+/// beside its place, renamed when it is complete.
+///
+/// # Errors
+/// [`Error::Io`] where that fails; what was at `path` is then as it was.
+pub fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let cannot = |action| {
         move |source| Error::Io {
             path: path.to_path_buf(),
@@ -30,7 +31,11 @@ pub(super) fn write_file(
         writer.flush()
     };
     if path == Path::new("-") {
-        return buffered(&mut io::stdout().lock()).map_err(cannot("cannot write"));
+        return buffered(&mut io::stdout().lock()).map_err(|source| Error::Io {
+            path: "<stdout>".into(),
+            action: "cannot write",
+            source,
+        });
     }
     match fs::metadata(path) {
         Ok(there) if there.is_dir() => {
@@ -48,7 +53,7 @@ pub(super) fn write_file(
             // Through a link, so that the link stays and what it points to is replaced.
             let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
             let mut beside =
-                create_beside(&target).map_err(cannot("cannot create a file beside"))?;
+                create_beside(&target).map_err(cannot("cannot create a file there"))?;
             buffered(beside.as_file_mut()).map_err(cannot("cannot write"))?;
             if let Ok(there) = there {
                 let same = beside.as_file().set_permissions(there.permissions());
@@ -58,6 +63,29 @@ pub(super) fn write_file(
                 .persist(&target)
                 .map_err(|e| cannot("cannot replace")(e.error))?;
             Ok(())
+        }
+    }
+}
+
+/// Whether a file can be put at `path`: to be asked before the work that fills it.
+///
+/// # Errors
+/// [`Error::Io`] where it is a folder, or no file can be created in its folder.
+pub fn check_place(path: &Path) -> Result<()> {
+    let cannot = |source| Error::Io {
+        path: path.to_path_buf(),
+        action: "cannot create a file there",
+        source,
+    };
+    if path == Path::new("-") {
+        return Ok(());
+    }
+    match fs::metadata(path) {
+        Ok(there) if there.is_dir() => Err(cannot(io::ErrorKind::IsADirectory.into())),
+        Ok(there) if !there.is_file() => Ok(()),
+        _ => {
+            let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+            create_beside(&target).map(drop).map_err(cannot)
         }
     }
 }
@@ -73,7 +101,13 @@ fn create_beside(target: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
     // The usual permissions of a new file, from which the system takes the umask away.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(directory)
+    let created = builder.tempfile_in(directory);
+    // Without the temporary name, which says nothing to the reader of a message.
+    created.map_err(|error| {
+        error
+            .raw_os_error()
+            .map_or(error, io::Error::from_raw_os_error)
+    })
 }
 
 /// The scalar type that holds a mesh's coordinates: without an origin of its own a mesh is single

@@ -69,9 +69,10 @@ impl<S: EdgeStore> Mesh<S> {
             }
             self.add_fan(self.tail(e), start);
         }
+        self.fan_rows.sort_all();
     }
 
-    /// Adds a fan, given by its first edge, to those of `v`.
+    /// Adds a fan, given by its first edge, to those of `v`; leaves the row of several unsorted.
     pub(super) fn add_fan(&mut self, v: VertexId, start: EdgeId) {
         let outgoing = match self.outgoing(v) {
             Outgoing::None => {

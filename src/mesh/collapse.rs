@@ -42,9 +42,6 @@ enum Order {
 
 type Neighbours = SmallVec<[VertexId; 24]>;
 
-/// Above this many neighbours the common ones are found by bisection, not by comparing all.
-const MANY_NEIGHBOURS: usize = 48;
-
 impl<S: EdgeStore> Mesh<S> {
     /// Whether collapsing `e` keeps the complex's topology: Dey, Edelsbrunner, Guha, Nekhayev
     /// 1999, *Topology preserving edge contraction*, the link condition for 2-complexes.
@@ -59,7 +56,8 @@ impl<S: EdgeStore> Mesh<S> {
     /// With *singular* for an edge that is no manifold pair (a boundary or a non-manifold edge):
     /// - no face at `e` has two singular edges beside it: they would merge into one;
     /// - where `e` is regular, at most one end lies on a singular edge or is a singular point;
-    /// - where `e` is singular, at most one end is a [`Order::Point`];
+    /// - where `e` is singular, at most one end is a point where more than sheets along one
+    ///   curve meet;
     /// - the common neighbours of both ends are the apexes of the faces at `e`;
     /// - no edge lies across from both ends (a tetrahedron, a pillow).
     pub fn refusal(&self, e: EdgeId) -> Option<Refusal> {
@@ -89,56 +87,100 @@ impl<S: EdgeStore> Mesh<S> {
         None
     }
 
+    /// Whether a vertex other than the apexes lies next to both ends.
+    ///
+    /// Walks both ends in turns until one is done. Where the other end is busy, it is asked from
+    /// the neighbours of the first instead, so that a vertex of valence 100 000 does not cost its
+    /// valence for each of its edges.
     fn has_other_common_neighbour(&self, u: VertexId, v: VertexId, apexes: &Neighbours) -> bool {
-        let mut around_u = Neighbours::new();
-        self.for_each_neighbour(u, |x| around_u.push(x));
-        let many = around_u.len() > MANY_NEIGHBOURS;
-        if many {
-            around_u.sort_unstable();
-        }
-        let is_around_u = |x: VertexId| {
-            if many {
-                around_u.binary_search(&x).is_ok()
-            } else {
-                around_u.contains(&x)
+        let (mut at_u, mut at_v) = (self.neighbours(u), self.neighbours(v));
+        let (mut around_u, mut around_v) = (Neighbours::new(), Neighbours::new());
+        let (few, busy) = loop {
+            match at_u.next() {
+                Some(x) => around_u.push(x),
+                None => break (&mut around_u, v),
+            }
+            match at_v.next() {
+                Some(x) => around_v.push(x),
+                None => break (&mut around_v, u),
             }
         };
-        let mut found = false;
-        self.for_each_neighbour(v, |x| found |= is_around_u(x) && !apexes.contains(&x));
-        found
+        if !few.spilled() {
+            let limit = 4 * few.len();
+            let mut others = self.neighbours(busy);
+            if !others
+                .by_ref()
+                .take(limit)
+                .any(|x| few.contains(&x) && !apexes.contains(&x))
+            {
+                return others.next().is_some()
+                    && few
+                        .iter()
+                        .filter(|x| !apexes.contains(x))
+                        .any(|&x| self.neighbours(x).any(|y| y == busy));
+            }
+            return true;
+        }
+        few.sort_unstable();
+        let mut apexes = apexes.clone();
+        apexes.sort_unstable();
+        self.neighbours(busy)
+            .any(|x| few.binary_search(&x).is_ok() && apexes.binary_search(&x).is_err())
     }
 
     /// Whether two apexes are joined by an edge that has a face with `u` and one with `v`.
+    ///
+    /// Such an edge lies across from `u` in one of the two faces beside a face at the edge; so only
+    /// those are looked at.
     fn has_common_link_edge(&self, u: VertexId, v: VertexId, star: &[EdgeId]) -> bool {
-        // From a face at the edge, the neighbour across each of its other two sides; where both
-        // neighbours share the apex's far vertex y, and the two faces (u, x, y) and (v, x, y)
-        // exist, x and y are both apexes. So look at the faces around the apexes' side of u.
         if star.len() < 2 {
             return false;
         }
         let mut apexes: SmallVec<[VertexId; 4]> = star.iter().map(|&d| self.apex(d)).collect();
         apexes.sort_unstable();
+        // Pairs of apexes that have a face with `center`: across the side from `center` to an apex.
         let pairs_at = |center: VertexId| {
             let mut pairs: SmallVec<[[VertexId; 2]; 4]> = SmallVec::new();
-            for e in self.outgoing_edges(center) {
-                let (a, b) = (self.head(e), self.apex(e));
-                if apexes.binary_search(&a).is_ok() && apexes.binary_search(&b).is_ok() {
-                    pairs.push([a.min(b), a.max(b)]);
+            for &d in star {
+                let [behind, before] = [self.next(d), self.prev(d)];
+                let side = if self.tail(behind) == center {
+                    behind
+                } else {
+                    before
+                };
+                let x = self.apex(d);
+                for beside in self.edge_star(side) {
+                    let y = self.apex(beside);
+                    if y != x && apexes.binary_search(&y).is_ok() {
+                        pairs.push([x.min(y), x.max(y)]);
+                    }
                 }
             }
+            pairs.sort_unstable();
             pairs
         };
         let at_u = pairs_at(u);
-        !at_u.is_empty() && pairs_at(v).iter().any(|pair| at_u.contains(pair))
+        !at_u.is_empty()
+            && pairs_at(v)
+                .iter()
+                .any(|pair| at_u.binary_search(pair).is_ok())
     }
 
-    /// How far the surroundings of `v` are from a disk. Constant time at a closed fan, else a walk.
+    /// How far the surroundings of `v` are from a disk. Constant time at a single fan; else a walk,
+    /// until two fans disagree.
     fn order(&self, v: VertexId) -> Order {
+        if let Outgoing::Fan(start) = self.outgoing(v) {
+            return match self.opposite(start) {
+                Opposite::Edge(_) => Order::Disk,
+                Opposite::Boundary => Order::Curve,
+                // The fan ends where it began.
+                Opposite::NonManifold(_) => Order::Point,
+            };
+        }
         let mut curve: Option<[VertexId; 2]> = None;
         for start in self.fans(v) {
             if self.mate(start).is_some() {
-                let is_only = matches!(self.outgoing(v), Outgoing::Fan(_));
-                return if is_only { Order::Disk } else { Order::Point };
+                return Order::Point;
             }
             let (a, b) = (self.head(start), self.tail(self.fan_end(start)));
             let ends = [a.min(b), a.max(b)];
@@ -172,7 +214,12 @@ impl<S: EdgeStore> Mesh<S> {
             && !matches!(self.opposite(e), Opposite::NonManifold(_))
             && matches!(self.outgoing(removed), Outgoing::Fan(_))
             && matches!(self.outgoing(kept), Outgoing::Fan(_));
-        let is_dead = |e: EdgeId| star.iter().any(|d| d.face() == e.face());
+        // In ascending order wherever there are more than two.
+        let dead_faces: SmallVec<[FaceId; 2]> = star.iter().map(|d| d.face()).collect();
+        let is_dead = |e: EdgeId| match dead_faces.len() {
+            0..=2 => dead_faces.contains(&e.face()),
+            _ => dead_faces.binary_search(&e.face()).is_ok(),
+        };
         let mut survivors: SmallVec<[EdgeId; 24]> = self.outgoing_edges(removed).collect();
         if !fans_are_simple {
             let of_kept: SmallVec<[EdgeId; 24]> = self.outgoing_edges(kept).collect();
@@ -224,7 +271,7 @@ impl<S: EdgeStore> Mesh<S> {
         Collapse {
             kept,
             removed,
-            dead_faces: star.iter().map(|d| d.face()).collect(),
+            dead_faces,
             merged_edges,
         }
     }
@@ -288,6 +335,9 @@ impl<S: EdgeStore> Mesh<S> {
                 seen[at] = true;
             }
             self.add_fan(v, start);
+        }
+        if let Outgoing::Fans(row) = self.outgoing(v) {
+            self.fan_rows.sort(row);
         }
     }
 }

@@ -28,6 +28,7 @@ pub use collapse::{Collapse, Refusal};
 pub use compact::Compaction;
 pub use ids::{EdgeId, FaceId, VertexId};
 pub use link::{Opposite, Outgoing, RowId};
+pub use orient::{Oriented, turn_round};
 pub use ring::{BoundaryCurve, Fan};
 pub use store::{EdgeStore, Full, Medium, Small, Tier};
 
@@ -144,16 +145,13 @@ impl<S: EdgeStore> Mesh<S> {
 
     /// Whether `v` has more than one fan or touches a non-manifold edge.
     ///
-    /// Costs a walk around `v` where its only fan is open.
+    /// Constant time: a non-manifold edge ends several fans, or one at both of its ends.
+    #[inline]
     pub fn is_non_manifold_vertex(&self, v: VertexId) -> bool {
         match self.outgoing(v) {
             Outgoing::Fans(_) => true,
             Outgoing::None => false,
-            Outgoing::Fan(start) => match self.opposite(start) {
-                Opposite::Edge(_) => false,
-                Opposite::NonManifold(_) => true,
-                Opposite::Boundary => !self.is_boundary(self.fan_end(start)),
-            },
+            Outgoing::Fan(start) => matches!(self.opposite(start), Opposite::NonManifold(_)),
         }
     }
 

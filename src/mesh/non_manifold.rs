@@ -40,11 +40,19 @@ impl SideTable {
         &self.rows[row.index()]
     }
 
-    /// Adds one edge to a row.
+    /// Adds one edge at the end of a row, which must be [sorted](Self::sort) before it is asked.
     pub fn push(&mut self, row: RowId, edge: EdgeId) {
-        let edges = &mut self.rows[row.index()];
-        let at = edges.partition_point(|&e| e < edge);
-        edges.insert(at, edge);
+        self.rows[row.index()].push(edge);
+    }
+
+    /// Puts a row in ascending order.
+    pub fn sort(&mut self, row: RowId) {
+        self.rows[row.index()].sort_unstable();
+    }
+
+    /// Puts every row in ascending order.
+    pub fn sort_all(&mut self) {
+        self.rows.iter_mut().for_each(|row| row.sort_unstable());
     }
 
     /// Puts `new` in the place of `old`, which must be in the row.

@@ -3,7 +3,53 @@
 use super::link::Opposite;
 use super::{EdgeId, EdgeStore, FaceId, Mesh};
 
+/// A mesh whose faces agree with their neighbours where they can.
+pub struct Oriented<S> {
+    /// The connectivity.
+    pub mesh: Mesh<S>,
+    /// One flag a face: whether it was turned round; nothing where none was.
+    pub flipped: Vec<bool>,
+    /// The edges at which two faces disagreed before.
+    pub disagreements: usize,
+}
+
+/// Turns the flagged triangles round.
+pub fn turn_round(triangles: &mut [[u32; 3]], flipped: &[bool]) {
+    for (triangle, _) in triangles
+        .iter_mut()
+        .zip(flipped)
+        .filter(|(_, flipped)| **flipped)
+    {
+        triangle.swap(1, 2);
+    }
+}
+
 impl<S: EdgeStore> Mesh<S> {
+    /// [`from_triangles`](Self::from_triangles), neighbours turned to agree first.
+    ///
+    /// # Panics
+    /// As [`from_triangles`](Self::from_triangles).
+    pub fn oriented(vertices: usize, mut triangles: Vec<[u32; 3]>) -> Oriented<S> {
+        let mesh = Self::from_triangles(vertices, &triangles);
+        let disagreements = mesh.same_way_pair_count();
+        if disagreements == 0 {
+            return Oriented {
+                mesh,
+                flipped: Vec::new(),
+                disagreements,
+            };
+        }
+        let flipped = mesh.faces_to_flip();
+        drop(mesh);
+        turn_round(&mut triangles, &flipped);
+        let mesh = Self::from_triangles(vertices, &triangles);
+        Oriented {
+            mesh,
+            flipped,
+            disagreements,
+        }
+    }
+
     /// The number of edges that exactly two faces share and run along the same way.
     pub fn same_way_pair_count(&self) -> usize {
         self.edge_rows.rows().filter(|row| row.len() == 2).count()
@@ -62,33 +108,24 @@ mod tests {
     use super::*;
     use crate::shapes;
 
-    fn oriented<S: EdgeStore>(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<bool>, usize) {
-        let flip = Mesh::<S>::from_triangles(vertices, triangles).faces_to_flip();
-        let turned: Vec<_> = triangles
-            .iter()
-            .zip(&flip)
-            .map(|(&[a, b, c], &f)| if f { [a, c, b] } else { [a, b, c] })
-            .collect();
-        let mesh = Mesh::<S>::from_triangles(vertices, &turned);
-        (flip, mesh.same_way_pair_count())
-    }
-
     /// Three of twenty faces turned: the three are found, not the seventeen.
     fn the_smaller_part_is_flipped<S: EdgeStore>() {
         let (positions, mut triangles) = shapes::icosphere(0);
         for i in [2, 7, 11] {
             triangles[i].swap(1, 2);
         }
-        let (flip, conflicts) = oriented::<S>(positions.len(), &triangles);
-        assert_eq!(conflicts, 0);
-        let found: Vec<_> = (0..20).filter(|&i| flip[i]).collect();
+        let oriented = Mesh::<S>::oriented(positions.len(), triangles);
+        assert!(oriented.disagreements > 0);
+        assert_eq!(oriented.mesh.same_way_pair_count(), 0);
+        let found: Vec<_> = (0..20).filter(|&i| oriented.flipped[i]).collect();
         assert_eq!(found, [2, 7, 11]);
     }
 
     /// A Möbius strip has no orientation: at least one edge stays in conflict.
     fn a_moebius_strip_keeps_a_conflict<S: EdgeStore>() {
         let (positions, triangles) = shapes::moebius(12);
-        assert!(oriented::<S>(positions.len(), &triangles).1 > 0);
+        let mesh = Mesh::<S>::oriented(positions.len(), triangles).mesh;
+        assert!(mesh.same_way_pair_count() > 0);
     }
 
     crate::for_each_tier!(

@@ -144,20 +144,22 @@ impl<S: EdgeStore> Mesh<S> {
         self.vertex_edges(v).into_iter().map(other).collect()
     }
 
-    /// Calls `visit` with every vertex next to `v`; with those on a non-manifold edge at `v` once
-    /// for each fan that ends there.
+    /// Every vertex next to `v`; those on a non-manifold edge at `v` once for each fan that ends
+    /// there.
     #[inline]
-    pub fn for_each_neighbour(&self, v: VertexId, mut visit: impl FnMut(VertexId)) {
-        for start in self.fans(v) {
-            let mut last = start;
-            for e in self.fan(start) {
-                visit(self.head(e));
-                last = e;
-            }
-            if self.mate(start).is_none() {
-                visit(self.tail(self.prev(last)));
-            }
-        }
+    pub fn neighbours(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
+        self.fans(v).flat_map(move |start| {
+            let is_open = self.mate(start).is_none();
+            let mut fan = self.fan(start);
+            let mut last = Some(start).filter(|_| is_open);
+            std::iter::from_fn(move || match fan.next() {
+                Some(e) => {
+                    last = last.map(|_| e);
+                    Some(self.head(e))
+                }
+                None => last.take().map(|e| self.apex(e)),
+            })
+        })
     }
 
     /// The first edge of the fan that the outgoing edge `e` lies in; of a closed fan `e` itself.

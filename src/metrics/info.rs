@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use crate::clean::{Cleaning, clean};
 use crate::error::Result;
 use crate::indexed_mesh::IndexedMesh;
-use crate::mesh::{EdgeId, EdgeStore, FaceId, Mesh, Opposite, Small, Tier, VertexId};
+use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, Oriented, Outgoing, Small, Tier, VertexId};
 
 /// What is in a mesh, after cleaning but for the first two numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,40 +65,37 @@ pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
         .map(|t| t.map(|v| mesh.positions()[v as usize].as_dvec3()))
         .filter(|[a, b, c]| (*b - *a).cross(*c - *a).length_squared() == 0.0)
         .count();
-    let (_, positions, mut faces, _) = mesh.into_parts();
-    let as_given = Mesh::<Small>::from_triangles(positions.len(), &faces);
-    let inconsistent_edges = as_given.same_way_pair_count();
-    let mesh = if inconsistent_edges == 0 {
-        as_given
-    } else {
-        let flip = as_given.faces_to_flip();
-        for (t, _) in faces.iter_mut().zip(&flip).filter(|(_, flip)| **flip) {
-            t.swap(1, 2);
-        }
-        Mesh::from_triangles(positions.len(), &faces)
-    };
+    let (_, positions, faces, _) = mesh.into_parts();
+    let face_count = faces.len();
+    let Oriented {
+        mesh,
+        disagreements: inconsistent_edges,
+        ..
+    } = Mesh::<Small>::oriented(positions.len(), faces);
     let is_orientable = mesh.same_way_pair_count() == 0;
     let edges = mesh.edges().count();
-    let boundary_edges = mesh.edges().filter(|&e| mesh.is_boundary(e)).count();
-    let boundary_loops = mesh
-        .boundary_curves()
-        .iter()
-        .filter(|c| c.is_closed)
-        .count();
+    let boundary: Vec<EdgeId> = mesh.edges().filter(|&e| mesh.is_boundary(e)).collect();
+    let mut loops = Loops::new(&boundary);
+    let mut non_manifold_vertices = 0;
+    for v in mesh.vertices() {
+        let is_inner = matches!(mesh.outgoing(v), Outgoing::Fan(e) if mesh.mate(e).is_some());
+        if !is_inner {
+            let around = Around::of(&mesh, v);
+            non_manifold_vertices += usize::from(around.is_crowded || around.pieces > 1);
+            loops.join(&around.rims);
+        }
+    }
+    let (boundary_edges, boundary_loops) = (boundary.len(), loops.closed());
     let non_manifold_edges = mesh.non_manifold_edge_count() - mesh.same_way_pair_count();
-    let non_manifold_vertices = mesh
-        .vertices()
-        .filter(|&v| is_non_manifold(&mesh, v))
-        .count();
     let components = components(&mesh);
     let euler_characteristic = mesh.vertex_count() as i64 - edges as i64 + mesh.face_count() as i64;
     let is_manifold = non_manifold_edges == 0 && non_manifold_vertices == 0;
     // χ = 2·components − 2·genus − loops.
     let genus = (is_manifold && is_orientable)
         .then(|| (2 * components as i64 - boundary_loops as i64 - euler_characteristic) / 2);
-    let tables = mesh.bytes() + size_of_val(&positions[..])
-        - Tier::Small.bytes(positions.len(), faces.len());
-    let bytes = |tier: Tier| tier.bytes(positions.len(), faces.len()) + tables;
+    let tables =
+        mesh.bytes() + size_of_val(&positions[..]) - Tier::Small.bytes(positions.len(), face_count);
+    let bytes = |tier: Tier| tier.bytes(positions.len(), face_count) + tables;
     Ok(Info {
         vertices,
         triangles,
@@ -120,48 +117,122 @@ pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
     })
 }
 
-/// Whether `v` lies on an edge of three faces or more, or its faces are not one fan. Two fans that
-/// meet at an edge where their faces disagree in direction are one.
-fn is_non_manifold<S: EdgeStore>(mesh: &Mesh<S>, v: VertexId) -> bool {
-    if !mesh.is_non_manifold_vertex(v) {
-        return false;
-    }
-    let mut fans = 0usize;
-    let mut seams: SmallVec<[EdgeId; 8]> = SmallVec::new();
-    for start in mesh.fans(v) {
-        fans += 1;
-        let last = mesh.fan(start).last().unwrap_or(start);
-        for end in [start, mesh.prev(last)] {
-            match mesh.opposite(end) {
-                Opposite::NonManifold(_) if mesh.edge_star(end).len() > 2 => return true,
-                Opposite::NonManifold(_) => seams.push(mesh.canonical(end)),
-                Opposite::Edge(_) | Opposite::Boundary => {}
+/// What lies around a vertex. Fans that meet at an edge where their two faces disagree in direction
+/// are one piece: no orientation makes such faces agree, yet the surface goes on there.
+struct Around {
+    /// Whether an edge of three faces or more ends here.
+    is_crowded: bool,
+    /// The pieces that share nothing here but the vertex.
+    pieces: usize,
+    /// The two boundary edges of each piece that has two.
+    rims: SmallVec<[[EdgeId; 2]; 2]>,
+}
+
+impl Around {
+    fn of<S: EdgeStore>(mesh: &Mesh<S>, v: VertexId) -> Self {
+        let mut is_crowded = false;
+        // The piece that each fan belongs to; the fans that meet at each seam and rim.
+        let mut piece: SmallVec<[usize; 8]> = SmallVec::new();
+        let mut seams: SmallVec<[(EdgeId, usize); 8]> = SmallVec::new();
+        let mut rims: SmallVec<[(usize, EdgeId); 8]> = SmallVec::new();
+        for start in mesh.fans(v) {
+            let fan = piece.len();
+            piece.push(fan);
+            let last = mesh.fan(start).last().unwrap_or(start);
+            for end in [start, mesh.prev(last)] {
+                match mesh.opposite(end) {
+                    Opposite::NonManifold(_) if mesh.edge_star(end).len() > 2 => is_crowded = true,
+                    Opposite::NonManifold(_) => seams.push((mesh.canonical(end), fan)),
+                    Opposite::Boundary => rims.push((fan, end)),
+                    Opposite::Edge(_) => {}
+                }
             }
         }
+        seams.sort_unstable();
+        let mut pieces = piece.len();
+        for pair in seams.chunk_by(|a, b| a.0 == b.0).filter(|p| p.len() == 2) {
+            let [a, b] = [pair[0].1, pair[1].1].map(|fan| root(&mut piece, fan));
+            pieces -= usize::from(a != b);
+            piece[a.max(b)] = a.min(b);
+        }
+        rims.iter_mut()
+            .for_each(|(fan, _)| *fan = root(&mut piece, *fan));
+        rims.sort_unstable();
+        let pairs = rims.chunk_by(|a, b| a.0 == b.0).filter(|r| r.len() == 2);
+        let rims = pairs.map(|r| [r[0].1, r[1].1]).collect();
+        Self {
+            is_crowded,
+            pieces,
+            rims,
+        }
     }
-    seams.sort_unstable();
-    seams.dedup();
-    // Fans are the pieces of a closed or open chain whose joints are the seams.
-    fans > seams.len().max(1) && fans != seams.len() + 1
+}
+
+/// Boundary edges, joined end to end.
+struct Loops<'a> {
+    edges: &'a [EdgeId],
+    parent: Vec<usize>,
+    joints: Vec<usize>,
+}
+
+impl<'a> Loops<'a> {
+    /// These edges, ascending, each for itself.
+    fn new(edges: &'a [EdgeId]) -> Self {
+        Self {
+            edges,
+            parent: (0..edges.len()).collect(),
+            joints: vec![0; edges.len()],
+        }
+    }
+
+    fn join(&mut self, pairs: &[[EdgeId; 2]]) {
+        for pair in pairs {
+            let [a, b] = pair.map(|e| {
+                let at = self
+                    .edges
+                    .binary_search(&e)
+                    .expect("a rim is a boundary edge");
+                root(&mut self.parent, at)
+            });
+            let (to, from) = (a.min(b), a.max(b));
+            self.parent[from] = to;
+            self.joints[to] += 1 + if a == b { 0 } else { self.joints[from] };
+        }
+    }
+
+    /// The number of closed runs: those with as many joints as edges.
+    fn closed(mut self) -> usize {
+        let mut edges = vec![0; self.edges.len()];
+        for i in 0..self.edges.len() {
+            edges[root(&mut self.parent, i)] += 1;
+        }
+        edges
+            .iter()
+            .zip(&self.joints)
+            .filter(|&(&n, &joints)| n > 0 && n == joints)
+            .count()
+    }
+}
+
+/// The representative of `i` in a forest of parents; shortens the way there.
+fn root(parent: &mut [usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    i
 }
 
 /// The number of pieces joined through shared vertices.
 fn components<S: EdgeStore>(mesh: &Mesh<S>) -> usize {
-    let mut parent: Vec<u32> = (0..mesh.vertex_slots() as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
+    let mut parent: Vec<usize> = (0..mesh.vertex_slots()).collect();
     let mut pieces = mesh.vertex_count();
     for f in mesh.faces() {
-        let [a, b, c] = FaceId::edges(f).map(|e| mesh.tail(e).index() as u32);
+        let [a, b, c] = mesh.face_vertices(f).map(VertexId::index);
         for (v, w) in [(a, b), (b, c)] {
             let (v, w) = (root(&mut parent, v), root(&mut parent, w));
             if v != w {
-                parent[v.max(w) as usize] = v.min(w);
+                parent[v.max(w)] = v.min(w);
                 pieces -= 1;
             }
         }
@@ -225,6 +296,7 @@ mod tests {
             (0, 0)
         );
         assert_eq!((strip.euler_characteristic, strip.genus), (0, None));
+        assert_eq!((strip.boundary_loops, strip.boundary_edges), (1, 24));
     }
 
     /// One turned face: three of its edges disagree, and it can be turned back.
