@@ -16,7 +16,8 @@ use decimate::mesh::Tier;
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     override_usage = "decimate INPUT -o OUTPUT [--ratio R] [--triangles N] [--max-error E] [OPTIONS]\n       \
-                      decimate info MESH [--json]",
+                      decimate info MESH [--json]\n       \
+                      decimate compare REFERENCE MESH... [--json]",
     after_help = "Exit status: 0 done (also when stopped short, which is said), 1 a file or mesh could not be \
                   processed, 2 wrong usage, 3 stopped short under --strict.\n\n\
                   Examples:\n  \
@@ -38,6 +39,30 @@ pub struct Cli {
 pub enum Command {
     /// Says what is in a mesh, and what each memory tier would need.
     Info(InfoArgs),
+    /// Measures how far meshes are from a reference, and what is wrong with them.
+    Compare(CompareArgs),
+}
+
+/// The arguments of `decimate compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// The mesh to measure against: PLY, OBJ, STL or OFF.
+    pub reference: PathBuf,
+    /// The meshes to measure.
+    #[arg(required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// Samples on each surface, spread by area; vertices are added for the largest distance.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    pub samples: usize,
+    /// Count pairs of triangles that cut each other, too.
+    #[arg(long)]
+    pub intersections: bool,
+    /// Print JSON: a list with an object for each mesh.
+    #[arg(long)]
+    pub json: bool,
+    /// The threads to use; all processors where not given. The numbers do not depend on it.
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
 }
 
 /// The arguments of `decimate info`.

@@ -32,5 +32,6 @@ pub mod indexed_mesh;
 pub mod io;
 pub mod mesh;
 pub mod metrics;
+pub mod nearest;
 #[cfg(test)]
 mod shapes;

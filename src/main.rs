@@ -14,11 +14,11 @@ use clap::{CommandFactory, Parser};
 use decimate::decimate::{Progress, Report, StopReason, decimate_with_progress, peak_rss_bytes};
 use decimate::error::Error;
 use decimate::io::{self, WriteOptions};
-use decimate::metrics::{Info, info};
+use decimate::metrics::{CompareOptions, Comparison, Info, Reference, TwoSided, info};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use cli::{Cli, Command, InfoArgs, Run};
+use cli::{Cli, Command, CompareArgs, InfoArgs, Run};
 
 /// Exit status of a run that stopped short under `--strict`.
 const STOPPED_SHORT: u8 = 3;
@@ -27,6 +27,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match &cli.command {
         Some(Command::Info(args)) => show_info(args),
+        Some(Command::Compare(args)) => show_comparison(args),
         None => run(&cli.run),
     };
     done.unwrap_or_else(|error| {
@@ -110,6 +111,44 @@ fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
         write_json(Path::new("-"), &info)?;
     } else {
         io::write_file(Path::new("-"), |out| out.write_all(table(&info).as_bytes()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A mesh held against the reference, with the names of both files.
+#[derive(Serialize)]
+struct Compared {
+    reference_file: String,
+    mesh_file: String,
+    #[serde(flatten)]
+    comparison: Comparison,
+}
+
+fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
+    use_threads(args.threads)?;
+    let name = |error| name_mesh(error, &args.reference);
+    let reference = Reference::new(io::read(&args.reference, None)?).map_err(name)?;
+    let options = CompareOptions {
+        samples: args.samples,
+        intersections: args.intersections,
+    };
+    let mut compared = Vec::new();
+    for path in &args.meshes {
+        let comparison = reference
+            .compare(io::read(path, None)?, &options)
+            .map_err(|error| name_mesh(error, path))?;
+        compared.push(Compared {
+            reference_file: args.reference.display().to_string(),
+            mesh_file: path.display().to_string(),
+            comparison,
+        });
+    }
+    if args.json {
+        write_json(Path::new("-"), &compared)?;
+    } else {
+        io::write_file(Path::new("-"), |out| {
+            out.write_all(comparison_table(&compared).as_bytes())
+        })?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -293,4 +332,112 @@ fn table(info: &Info) -> String {
     rows.iter()
         .map(|(name, value)| format!("{name:30} {value:>14}\n"))
         .collect()
+}
+
+/// Comparisons as a table, a column a mesh. Distances are fractions of the diagonal.
+fn comparison_table(compared: &[Compared]) -> String {
+    let Some(Compared {
+        reference_file,
+        comparison,
+        ..
+    }) = compared.first()
+    else {
+        return String::new();
+    };
+    let diagonal = comparison.diagonal;
+    let mut text = format!(
+        "reference {reference_file}, diagonal {diagonal} model units; distances are fractions of it\n"
+    );
+    let file_name = |c: &Compared| {
+        let name = Path::new(&c.mesh_file).file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    };
+    let width = compared
+        .iter()
+        .map(|c| file_name(c).chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(12);
+    let mut row = |name: &str, value: &dyn Fn(&Comparison) -> String| {
+        text += &format!("{name:36}");
+        for c in compared {
+            text += &format!(" {:>width$}", value(&c.comparison));
+        }
+        text.push('\n');
+    };
+    let distance =
+        |of: fn(&TwoSided) -> f64| move |c: &Comparison| format!("{:.4e}", of(&c.surface));
+    let boundary = |of: fn(&TwoSided) -> f64| {
+        move |c: &Comparison| {
+            c.boundary
+                .as_ref()
+                .map_or("-".into(), |b| format!("{:.4e}", of(b)))
+        }
+    };
+    row("triangles", &|c| c.mesh.triangles.to_string());
+    row("rms", &distance(|d| d.two_sided_of_diagonal.rms));
+    row(
+        "  from reference",
+        &distance(|d| d.from_reference_of_diagonal.rms),
+    );
+    row("  from mesh", &distance(|d| d.from_mesh_of_diagonal.rms));
+    row("mean", &distance(|d| d.two_sided_of_diagonal.mean));
+    row(
+        "  from reference",
+        &distance(|d| d.from_reference_of_diagonal.mean),
+    );
+    row("  from mesh", &distance(|d| d.from_mesh_of_diagonal.mean));
+    row("Hausdorff", &distance(|d| d.two_sided_of_diagonal.max));
+    row(
+        "  from reference",
+        &distance(|d| d.from_reference_of_diagonal.max),
+    );
+    row("  from mesh", &distance(|d| d.from_mesh_of_diagonal.max));
+    row("boundary rms", &boundary(|d| d.two_sided_of_diagonal.rms));
+    row(
+        "boundary Hausdorff",
+        &boundary(|d| d.two_sided_of_diagonal.max),
+    );
+    row("normal deviation, mean (degrees)", &|c| {
+        format!("{:.3}", c.normal_deviation_mean_degrees)
+    });
+    row("normal deviation, 99 % (degrees)", &|c| {
+        format!("{:.3}", c.normal_deviation_99th_percentile_degrees)
+    });
+    row("triangle quality, mean", &|c| {
+        format!("{:.4}", c.triangle_quality_mean)
+    });
+    row("triangles of quality under 0.05", &|c| {
+        format!("{:.2} %", 100.0 * c.sliver_share)
+    });
+    row("new boundary edges", &|c| c.new_boundary_edges.to_string());
+    row("new non-manifold edges", &|c| {
+        c.new_non_manifold_edges.to_string()
+    });
+    row("new non-manifold vertices", &|c| {
+        c.new_non_manifold_vertices.to_string()
+    });
+    row("inconsistently oriented edges", &|c| {
+        c.mesh.inconsistent_edges.to_string()
+    });
+    row("duplicate faces", &|c| {
+        (c.mesh.cleaning.dropped_duplicate_faces + c.mesh.cleaning.folded_faces).to_string()
+    });
+    row("degenerate faces", &|c| {
+        (c.mesh.cleaning.dropped_degenerate_faces + c.mesh.zero_area_faces).to_string()
+    });
+    row("components", &|c| c.mesh.components.to_string());
+    row("Euler characteristic", &|c| {
+        c.mesh.euler_characteristic.to_string()
+    });
+    row("intersecting pairs", &|c| {
+        c.intersecting_pairs.map_or("-".into(), |n| n.to_string())
+    });
+    let names = compared
+        .iter()
+        .map(|c| format!(" {:>width$}", file_name(c)));
+    let header = format!("{:36}{}\n", "", names.collect::<String>());
+    let first_row = text.find('\n').map_or(0, |end| end + 1);
+    text.insert_str(first_row, &header);
+    text
 }
