@@ -357,6 +357,52 @@ fn a_report_overwrites_no_mesh() {
     assert_eq!(folder.bytes("tetrahedron.off"), before);
 }
 
+/// Distances as fractions of the diagonal and in model units, for each mesh, whatever the threads.
+#[test]
+fn compare_measures_each_mesh_against_the_reference() {
+    let folder = Folder::with(&["sample.ply"]);
+    let ran = folder.run("sample.ply -o small.ply --ratio 0.05 --quiet");
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let compare = "compare sample.ply sample.ply small.ply --samples 20000";
+    let ran = folder.run(&format!("{compare} --json --threads 1"));
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    assert_eq!(
+        ran.stdout,
+        folder.run(&format!("{compare} --json --threads 4")).stdout
+    );
+    let found: Value = serde_json::from_slice(&ran.stdout).unwrap();
+    let rms = |i: usize| {
+        found[i]["surface"]["two_sided_of_diagonal"]["rms"]
+            .as_f64()
+            .unwrap()
+    };
+    assert!(rms(0) < 1e-9, "{}", rms(0));
+    assert!((1e-5..1e-3).contains(&rms(1)), "{}", rms(1));
+    let units = found[1]["surface"]["two_sided"]["rms"].as_f64().unwrap();
+    let diagonal = found[1]["diagonal"].as_f64().unwrap();
+    assert!((units / diagonal - rms(1)).abs() < 1e-12);
+    assert_eq!(found[1]["new_boundary_edges"], 0);
+    assert!(found[1]["boundary"]["two_sided"]["max"].as_f64().unwrap() > 0.0);
+    let table = folder.run(&format!("{compare} --intersections"));
+    let table = String::from_utf8_lossy(&table.stdout).into_owned();
+    for word in [
+        "small.ply",
+        "Hausdorff",
+        "boundary rms",
+        "triangle quality",
+        "intersecting pairs",
+    ] {
+        assert!(table.contains(word), "{word} is not in\n{table}");
+    }
+    folder.run("compare sample.ply").failed(2, "MESHES");
+    folder
+        .run("compare sample.ply absent.ply")
+        .failed(1, "absent.ply: cannot open");
+    folder
+        .run("compare sample.ply small.ply --samples 0")
+        .failed(2, "samples");
+}
+
 /// A thread has a stack; ten thousand of them would be the longest part of the work.
 #[test]
 fn any_number_of_threads_is_accepted() {

@@ -8,20 +8,24 @@ use std::path::{Path, PathBuf};
 
 use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
-/// Every room, and the rooms that it may use beside itself. `main` and `cli` are the command, over
+/// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 7] = [
+const ARROWS: [(&str, &[&str]); 8] = [
     ("error", &[]),
     ("indexed_mesh", &["error"]),
     ("mesh", &[]),
+    ("nearest", &[]),
     ("clean", &["error", "indexed_mesh"]),
     ("io", &["error", "indexed_mesh"]),
     ("decimate", &["error", "indexed_mesh", "clean", "mesh"]),
-    ("metrics", &["error", "indexed_mesh", "clean", "mesh"]),
+    (
+        "metrics",
+        &["error", "indexed_mesh", "clean", "mesh", "nearest"],
+    ),
 ];
 
 /// The files of the command, outside of the library.
-const COMMAND: [&str; 2] = ["main.rs", "cli.rs"];
+const COMMAND: [&str; 3] = ["main.rs", "cli.rs", "text.rs"];
 
 /// Tests and their shapes: a file here is allowed everything, and its `mod` must be `cfg(test)`.
 const TEST_FILES: [&str; 3] = ["shapes.rs", "mesh/tests.rs", "decimate/tests.rs"];
