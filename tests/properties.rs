@@ -489,12 +489,16 @@ fn any_input_keeps_its_topology_in_every_tier() {
             let counts = |r: &Report| {
                 (
                     [
-                        r.rejected_link,
-                        r.rejected_flip,
-                        r.rejected_lock,
-                        r.rejected_error,
+                        r.tally.rejected_link,
+                        r.tally.rejected_flip,
+                        r.tally.rejected_lock,
+                        r.tally.rejected_error,
                     ],
-                    [r.collapses, r.collapses_non_manifold, r.triangles_out],
+                    [
+                        r.tally.collapses,
+                        r.tally.collapses_non_manifold,
+                        r.triangles_out,
+                    ],
                     r.max_error_estimate.to_bits(),
                     (r.stop_reason, r.blocked, r.cleaning),
                 )
@@ -558,7 +562,7 @@ fn any_input_keeps_its_topology_in_every_tier() {
         assert_eq!(report.triangles_out, output.triangle_count(), "case {case}");
         assert_eq!(
             cleaned.positions().len() - output.positions().len(),
-            report.collapses,
+            report.tally.collapses,
             "case {case}: a vertex goes with a collapse"
         );
         // Above the target only with a reason.
@@ -643,7 +647,7 @@ fn the_output_of_the_output_is_equal() {
         };
         let (twice, report) = decimated(case, &once, &all).expect("has triangles");
         assert_same(&twice, &once, &format!("case {case}"));
-        assert_eq!(report.collapses, 0, "case {case}");
+        assert_eq!(report.tally.collapses, 0, "case {case}");
     });
 }
 
@@ -758,12 +762,15 @@ fn the_cases_cover_what_can_happen() {
             continue;
         };
         let before = info(mesh, options.weld).unwrap();
-        count("collapses", report.collapses);
-        count("collapses non-manifold", report.collapses_non_manifold);
-        count("rejected for the link", report.rejected_link);
-        count("rejected for a flip", report.rejected_flip);
-        count("rejected for a lock", report.rejected_lock);
-        count("rejected for the error", report.rejected_error);
+        count("collapses", report.tally.collapses);
+        count(
+            "collapses non-manifold",
+            report.tally.collapses_non_manifold,
+        );
+        count("rejected for the link", report.tally.rejected_link);
+        count("rejected for a flip", report.tally.rejected_flip);
+        count("rejected for a lock", report.tally.rejected_lock);
+        count("rejected for the error", report.tally.rejected_error);
         count("welded", report.cleaning.welded_vertices);
         count("degenerate", report.cleaning.dropped_degenerate_faces);
         count("duplicate", report.cleaning.dropped_duplicate_faces);

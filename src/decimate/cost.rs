@@ -232,7 +232,7 @@ impl Memoryless {
         let slots = mesh.vertex_slots();
         let mut model = Self {
             tensors: Vec::new(),
-            lag: vec![Lag::default(); slots],
+            lag: Vec::new(),
             boundary_weight,
             placement,
         };

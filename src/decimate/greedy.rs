@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::cost::{Cost, Evaluation};
 use super::geometry::Geometry;
 use super::queue::{Candidate, Queue};
-use super::report::{Blocked, StopReason};
+use super::report::{Blocked, StopReason, Tally};
 use super::rules;
 use crate::error::{Error, Result};
 use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
@@ -20,26 +20,6 @@ pub struct Stop {
     pub triangles: usize,
     /// Before an estimated error above this, in the unit box.
     pub max_error: Option<f64>,
-}
-
-/// What the loop counted.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Tally {
-    /// Collapses done.
-    pub collapses: usize,
-    /// Of these, the ones that touched something non-manifold: a vertex at an end of the edge or
-    /// across from it in a dying face.
-    pub collapses_non_manifold: usize,
-    /// Refusals because the topology would have changed.
-    pub rejected_link: usize,
-    /// Refusals because a face would have turned.
-    pub rejected_flip: usize,
-    /// Edges never considered because both ends are locked.
-    pub rejected_lock: usize,
-    /// Refusals because of the largest error.
-    pub rejected_error: usize,
-    /// The most bytes that the loop's own arrays held at once.
-    pub bytes: usize,
 }
 
 /// The faces whose edges are evaluated at a time, in parallel.
@@ -298,9 +278,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             self.queue = queue;
         }
     }
-}
 
-impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'_, S, C, Q> {
     /// The name of the edge from the changed vertex `v` to `other`, unless it is `other`'s turn (both
     /// changed) or another directed edge's (several at `v`).
     fn name_at(&self, v: VertexId, other: VertexId, e: EdgeId, now: u32) -> Option<EdgeId> {
@@ -354,6 +332,6 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'_, S, C, Q> {
             + self.cost.bytes()
             + self.deviation.capacity() * size_of::<f32>()
             + self.changed_at.capacity() * size_of::<u32>();
-        self.tally.bytes = self.tally.bytes.max(bytes);
+        self.tally.working_bytes = self.tally.working_bytes.max(bytes);
     }
 }

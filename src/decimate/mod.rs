@@ -19,7 +19,7 @@ use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Ti
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
 pub use options::{Boundary, Options, Placement, Targets, TierChoice};
-pub use report::{Blocked, Report, StopReason};
+pub use report::{Blocked, Report, StopReason, Tally};
 
 use cost::Memoryless;
 use geometry::Geometry;
@@ -85,17 +85,11 @@ pub fn decimate_with_progress(
         stop_reason: StopReason::Target,
         stopped_short: false,
         blocked: None,
-        collapses: 0,
-        collapses_non_manifold: 0,
-        rejected_link: 0,
-        rejected_flip: 0,
-        rejected_lock: 0,
-        rejected_error: 0,
+        tally: Tally::default(),
         max_error_estimate: 0.0,
         tier,
         tier_reason,
         mesh_bytes: 0,
-        working_bytes: 0,
         read_seconds: 0.0,
         clean_seconds,
         build_seconds: 0.0,
@@ -165,7 +159,7 @@ fn run<S: EdgeStore>(
             triangles_target,
         })
     })?;
-    let tally = greedy.tally();
+    report.tally = greedy.tally();
     report.max_error_estimate = greedy.max_deviation() / scale;
     report.triangles_out = greedy.triangles();
     report.stop_reason = reason;
@@ -177,13 +171,6 @@ fn run<S: EdgeStore>(
         StopReason::Blocked => wanted,
         StopReason::Cancelled => true,
     };
-    report.collapses = tally.collapses;
-    report.collapses_non_manifold = tally.collapses_non_manifold;
-    report.rejected_link = tally.rejected_link;
-    report.rejected_flip = tally.rejected_flip;
-    report.rejected_lock = tally.rejected_lock;
-    report.rejected_error = tally.rejected_error;
-    report.working_bytes = tally.bytes;
     drop(greedy);
 
     let map = mesh.compact();

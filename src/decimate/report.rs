@@ -33,6 +33,26 @@ pub struct Blocked {
     pub error: usize,
 }
 
+/// What the loop counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Tally {
+    /// Collapses done.
+    pub collapses: usize,
+    /// Of these, the ones that touched something non-manifold: a vertex at an end of the edge or
+    /// across from it in a dying face.
+    pub collapses_non_manifold: usize,
+    /// Refusals because the topology would have changed.
+    pub rejected_link: usize,
+    /// Refusals because a face would have turned.
+    pub rejected_flip: usize,
+    /// Edges never considered because both ends are locked.
+    pub rejected_lock: usize,
+    /// Refusals because of the largest error.
+    pub rejected_error: usize,
+    /// The most bytes that the loop's own arrays held at once.
+    pub working_bytes: usize,
+}
+
 /// What a run did. Serialised, the keys are the command's report.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
@@ -62,19 +82,9 @@ pub struct Report {
     pub stopped_short: bool,
     /// Why the edges that are left cannot be collapsed, where it stopped before the target.
     pub blocked: Option<Blocked>,
-    /// Collapses done.
-    pub collapses: usize,
-    /// Of these, the ones that touched something non-manifold: a vertex at an end of the edge or
-    /// across from it in a dying face.
-    pub collapses_non_manifold: usize,
-    /// Times a candidate was refused because the topology would have changed.
-    pub rejected_link: usize,
-    /// Times a candidate was refused because a face would have turned or lost its area.
-    pub rejected_flip: usize,
-    /// Candidates never considered because both ends are locked.
-    pub rejected_lock: usize,
-    /// Times a candidate was refused because of the largest error.
-    pub rejected_error: usize,
+    /// What the loop counted.
+    #[serde(flatten)]
+    pub tally: Tally,
     /// The largest estimated distance of an output vertex from the original, in model units.
     pub max_error_estimate: f64,
     /// The tier that was used.
@@ -83,8 +93,6 @@ pub struct Report {
     pub tier_reason: String,
     /// The bytes of the mesh when built: the tier's words, positions and side tables.
     pub mesh_bytes: usize,
-    /// The most bytes that the decimation's own arrays held at once.
-    pub working_bytes: usize,
     /// Seconds to read the file; filled in by whoever read it.
     pub read_seconds: f64,
     /// Seconds to weld, drop and fold.

@@ -216,7 +216,7 @@ fn topology_is_kept_to_the_end<S: EdgeStore>() {
 fn three_fins_come_down_to_three_triangles<S: EdgeStore>() {
     let (small, report) = run_in::<S>(shapes::three_fins(16), to_triangles(0));
     assert_eq!(small.triangle_count(), 3);
-    assert!(report.collapses_non_manifold > 16);
+    assert!(report.tally.collapses_non_manifold > 16);
 }
 
 /// The boundary keeps its vertices where it is locked.
@@ -240,7 +240,7 @@ fn a_locked_boundary_keeps_its_bits<S: EdgeStore>() {
     };
     let (small, report) = run_in::<S>(shape, options);
     assert_eq!(sorted(small.positions()), before);
-    assert!(report.rejected_lock >= 80);
+    assert!(report.tally.rejected_lock >= 80);
     assert!(report.triangles_out <= 100);
 }
 
@@ -292,7 +292,7 @@ fn an_error_limit_is_kept<S: EdgeStore>() {
         );
         assert!(report.triangles_out < last);
         assert_eq!(report.stop_reason, StopReason::MaxError);
-        assert!(!report.stopped_short && report.rejected_error > 0);
+        assert!(!report.stopped_short && report.tally.rejected_error > 0);
         last = report.triangles_out;
     }
 }
@@ -353,7 +353,7 @@ fn ratio_one_is_the_identity<S: EdgeStore>() {
             },
         );
         assert_eq!(same, mesh(shape));
-        assert_eq!(report.collapses, 0);
+        assert_eq!(report.tally.collapses, 0);
     }
 }
 

@@ -18,16 +18,6 @@ pub struct Collapse {
     pub merged_edges: SmallVec<[EdgeId; 2]>,
 }
 
-/// Why a collapse would change the topology.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// The ends have a common neighbour that is no corner of a face at the edge, or two faces
-    /// would become the same.
-    Pinch,
-    /// The edge joins two different places of the boundary or of non-manifold curves.
-    Singular,
-}
-
 /// How far the surroundings of a vertex are from a disk (Dey et al. 1999, section 3).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Order {
@@ -46,13 +36,6 @@ impl<S: EdgeStore> Mesh<S> {
     /// Whether collapsing `e` keeps the complex's topology: Dey, Edelsbrunner, Guha, Nekhayev
     /// 1999, *Topology preserving edge contraction*, the link condition for 2-complexes.
     ///
-    /// Costs one walk around each end.
-    pub fn link_condition(&self, e: EdgeId) -> bool {
-        self.refusal(e).is_none()
-    }
-
-    /// Why the link condition does not hold at `e`, if it does not.
-    ///
     /// With *singular* for an edge that is no manifold pair (a boundary or a non-manifold edge):
     /// - no face at `e` has two singular edges beside it: they would merge into one;
     /// - where `e` is regular, at most one end lies on a singular edge or is a singular point;
@@ -60,7 +43,9 @@ impl<S: EdgeStore> Mesh<S> {
     ///   curve meet;
     /// - the common neighbours of both ends are the apexes of the faces at `e`;
     /// - no edge lies across from both ends (a tetrahedron, a pillow).
-    pub fn refusal(&self, e: EdgeId) -> Option<Refusal> {
+    ///
+    /// Costs one walk around each end.
+    pub fn link_condition(&self, e: EdgeId) -> bool {
         let [u, v] = self.edge_vertices(e);
         let star = self.edge_star(e);
         let is_singular = |e| self.mate(e).is_none();
@@ -68,7 +53,7 @@ impl<S: EdgeStore> Mesh<S> {
             .iter()
             .any(|&d| is_singular(self.next(d)) && is_singular(self.prev(d)))
         {
-            return Some(Refusal::Singular);
+            return false;
         }
         let (order_u, order_v) = (self.order(u), self.order(v));
         let limit = if is_singular(e) {
@@ -77,14 +62,10 @@ impl<S: EdgeStore> Mesh<S> {
             Order::Curve
         };
         if order_u >= limit && order_v >= limit {
-            return Some(Refusal::Singular);
+            return false;
         }
         let apexes: Neighbours = star.iter().map(|&d| self.apex(d)).collect();
-        if self.has_other_common_neighbour(u, v, &apexes) || self.has_common_link_edge(u, v, &star)
-        {
-            return Some(Refusal::Pinch);
-        }
-        None
+        !self.has_other_common_neighbour(u, v, &apexes) && !self.has_common_link_edge(u, v, &star)
     }
 
     /// Whether a vertex other than the apexes lies next to both ends.
@@ -106,20 +87,15 @@ impl<S: EdgeStore> Mesh<S> {
             }
         };
         if !few.spilled() {
-            let limit = 4 * few.len();
-            let mut others = self.neighbours(busy);
-            if !others
-                .by_ref()
-                .take(limit)
-                .any(|x| few.contains(&x) && !apexes.contains(&x))
-            {
-                return others.next().is_some()
-                    && few
-                        .iter()
-                        .filter(|x| !apexes.contains(x))
-                        .any(|&x| self.neighbours(x).any(|y| y == busy));
+            let is_other = |x: &VertexId| !apexes.contains(x);
+            let mut around_busy = self.neighbours(busy);
+            let mut first = around_busy.by_ref().take(4 * few.len());
+            if first.any(|x| few.contains(&x) && is_other(&x)) {
+                return true;
             }
-            return true;
+            let mut others = few.iter().filter(|x| is_other(x));
+            return around_busy.next().is_some()
+                && others.any(|&x| self.neighbours(x).any(|y| y == busy));
         }
         few.sort_unstable();
         let mut apexes = apexes.clone();

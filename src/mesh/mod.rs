@@ -24,7 +24,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use collapse::{Collapse, Refusal};
+pub use collapse::Collapse;
 pub use compact::Compaction;
 pub use ids::{EdgeId, FaceId, VertexId};
 pub use link::{Opposite, Outgoing, RowId};

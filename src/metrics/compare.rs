@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::info::{Info, info};
+use super::info::{Info, info_of_clean};
 use super::surface::{Curves, Surface};
 use crate::clean::clean;
 use crate::error::{Error, Result};
@@ -203,14 +203,16 @@ pub fn compare(
 }
 
 fn prepare(mesh: IndexedMesh, origin: DVec3) -> Result<(Info, Surface, Curves)> {
-    let info = info(mesh.clone(), true)?;
-    let (mesh, _) = clean(mesh, true)?;
+    let (vertices, triangles) = (mesh.positions().len(), mesh.triangle_count());
+    let (mesh, cleaning) = clean(mesh, true)?;
     if mesh.triangles().is_empty() {
         return Err(Error::InvalidMesh("no triangle to measure".into()));
     }
     let points: Vec<DVec3> = mesh.points().map(|p| p - origin).collect();
     let curves = Curves::of_boundary(&points, mesh.triangles());
-    Ok((info, Surface::new(points, mesh.triangles()), curves))
+    let surface = Surface::new(points, mesh.triangles());
+    let info = info_of_clean(mesh, vertices, triangles, cleaning);
+    Ok((info, surface, curves))
 }
 
 fn mean_and_99th_percentile(angles: &mut [f32]) -> (f64, f64) {

@@ -58,6 +58,16 @@ pub struct Info {
 pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangle_count());
     let (mesh, cleaning) = clean(mesh, weld)?;
+    Ok(info_of_clean(mesh, vertices, triangles, cleaning))
+}
+
+/// [`info`] of a mesh that has been cleaned, and had so many vertices and triangles before.
+pub(super) fn info_of_clean(
+    mesh: IndexedMesh,
+    vertices: usize,
+    triangles: usize,
+    cleaning: Cleaning,
+) -> Info {
     let diagonal = mesh.diagonal();
     let zero_area_faces = mesh
         .triangles()
@@ -96,7 +106,7 @@ pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
     let tables =
         mesh.bytes() + size_of_val(&positions[..]) - Tier::Small.bytes(positions.len(), face_count);
     let bytes = |tier: Tier| tier.bytes(positions.len(), face_count) + tables;
-    Ok(Info {
+    Info {
         vertices,
         triangles,
         cleaning,
@@ -114,7 +124,7 @@ pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
         full_tier_bytes: bytes(Tier::Full),
         medium_tier_bytes: bytes(Tier::Medium),
         small_tier_bytes: bytes(Tier::Small),
-    })
+    }
 }
 
 /// What lies around a vertex. Fans that meet at an edge where their two faces disagree in direction
