@@ -107,7 +107,8 @@ pub struct Comparison {
     pub triangle_quality_mean: f64,
     /// The share of the mesh's triangles whose quality is under 0.05.
     pub sliver_share: f64,
-    /// Boundary edges of the mesh beyond the reference's number.
+    /// Boundary edges of the mesh where the reference has no boundary: whose middle is farther from
+    /// every boundary edge of the reference than the edge is long.
     pub new_boundary_edges: usize,
     /// Non-manifold edges of the mesh beyond the reference's number.
     pub new_non_manifold_edges: usize,
@@ -180,7 +181,7 @@ impl Reference {
             normal_deviation_99th_percentile_degrees,
             triangle_quality_mean,
             sliver_share,
-            new_boundary_edges: more(|i| i.boundary_edges),
+            new_boundary_edges: curves.edges_away_from(&self.curves),
             new_non_manifold_edges: more(|i| i.non_manifold_edges),
             new_non_manifold_vertices: more(|i| i.non_manifold_vertices),
             intersecting_pairs: options.intersections.then(|| surface.intersecting_pairs()),
@@ -304,6 +305,17 @@ mod tests {
             })
         };
         assert_eq!(with(1), with(3));
+    }
+
+    /// A grid on one triangle fewer has three boundary edges more where it was torn, and its rim is
+    /// where it was.
+    #[test]
+    fn a_tear_is_told_from_the_rim() {
+        let (positions, mut triangles) = shapes::grid(9, 9);
+        triangles.remove(80);
+        let torn = mesh((positions, triangles));
+        let c = compare(mesh(shapes::grid(3, 3)), torn, &FEW).unwrap();
+        assert_eq!((c.new_boundary_edges, c.mesh.boundary_edges), (3, 39));
     }
 
     /// Equilateral triangles have quality 1; a needle next to 0.

@@ -176,6 +176,16 @@ impl Curves {
         self.set.is_empty()
     }
 
+    /// The number of these curves' edges that run nowhere near others: whose middle is farther from
+    /// them than the edge is long.
+    pub(super) fn edges_away_from(&self, other: &Self) -> usize {
+        let is_away = |[a, b, _]: &[DVec3; 3]| {
+            let nearest = other.set.nearest((*a + *b) * 0.5);
+            nearest.is_none_or(|n| n.distance_squared > a.distance_squared(*b))
+        };
+        self.set.corners().iter().filter(|s| is_away(s)).count()
+    }
+
     /// The distances from samples spread over these curves by length to others.
     pub(super) fn distances_to(&self, other: &Self, samples: usize, seed: u64) -> Distances {
         let sample = |i: usize, slot: usize| {
