@@ -15,6 +15,7 @@ mod build;
 mod check;
 mod collapse;
 mod compact;
+mod flip;
 mod ids;
 mod link;
 mod non_manifold;

@@ -74,11 +74,17 @@ impl SideTable {
             .map(Vec::as_slice)
     }
 
+    /// Renames the edges of one row, and sorts it again.
+    pub fn rename_row(&mut self, row: RowId, rename: impl Fn(EdgeId) -> EdgeId) {
+        let edges = &mut self.rows[row.index()];
+        edges.iter_mut().for_each(|e| *e = rename(*e));
+        edges.sort_unstable();
+    }
+
     /// Renames every edge, and sorts the rows again.
     pub fn rename(&mut self, rename: impl Fn(EdgeId) -> EdgeId) {
-        for row in &mut self.rows {
-            row.iter_mut().for_each(|e| *e = rename(*e));
-            row.sort_unstable();
+        for row in (0..self.rows.len()).map(RowId::new) {
+            self.rename_row(row, &rename);
         }
     }
 

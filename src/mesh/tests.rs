@@ -539,10 +539,54 @@ fn check_finds_what_is_wrong<S: EdgeStore>() {
     }
 }
 
+/// Random flips among random collapses: every table stays what a rebuild gives, the edge joins the
+/// apexes, and two flips give the same triangles back.
+fn flips_keep_tables_and_topology<S: EdgeStore>() {
+    let mut flips = 0;
+    for seed in 0..300 {
+        let (vertices, triangles) = if seed % 3 == 0 {
+            random_complex(seed)
+        } else {
+            random_surface(seed)
+        };
+        let mut mesh = Mesh::<S>::from_triangles(vertices, &triangles);
+        let mut random = Random(seed + 1);
+        for step in 0..60 {
+            let edges: Vec<EdgeId> = mesh.edges().collect();
+            if edges.is_empty() {
+                break;
+            }
+            let e = edges[random.below(edges.len())];
+            if step % 6 == 5 && mesh.link_condition(e) {
+                mesh.collapse(e);
+            } else if mesh.flip_condition(e) {
+                let apexes = [mesh.apex(mesh.mate(e).unwrap()), mesh.apex(e)];
+                let counts = |m: &Mesh<S>| (m.vertex_count(), m.edges().count(), m.face_count());
+                let counted = counts(&mesh);
+                let before: BTreeSet<_> = mesh.triangles().iter().map(sorted).collect();
+                mesh.flip(e);
+                mesh.check()
+                    .unwrap_or_else(|w| panic!("seed {seed}, {e:?}: {w}"));
+                assert_eq!(mesh.edge_vertices(e), apexes, "seed {seed}");
+                assert_eq!(counts(&mesh), counted, "seed {seed}");
+                flips += 1;
+                if step % 2 == 0 {
+                    mesh.flip(e);
+                    mesh.check().unwrap();
+                    let after: BTreeSet<_> = mesh.triangles().iter().map(sorted).collect();
+                    assert_eq!(after, before, "seed {seed}");
+                }
+            }
+        }
+    }
+    assert!(flips > 3000, "{flips}");
+}
+
 for_each_tier!(
     opposites_equal_brute_force,
     queries_equal_brute_force,
     collapses_keep_tables_and_topology,
+    flips_keep_tables_and_topology,
     the_link_condition_refuses_only_what_changes_something,
     surfaces_come_down_to_their_minimum,
     three_fins_share_one_row,
