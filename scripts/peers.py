@@ -13,8 +13,10 @@ The settings are the peers' defaults, but for the one called tuned:
     pymeshlab               meshing_decimation_quadric_edge_collapse
     pymeshlab-tuned         the same with quality threshold 0.3, boundary, normals and topology preserved
     vtk                     vtkQuadricDecimation, through pyvista's decimate
-    meshoptimizer-simplify  meshopt_simplify, no limit of the error: it keeps vertices where they are. The Python
-                            package has no simplifyWithUpdate, which moves them and comes closer to the surface
+    meshoptimizer-simplify  meshopt_simplify, no limit of the error: it keeps vertices where they are
+
+meshoptimizer's simplifyWithUpdate, which moves vertices and comes closer to the surface, is not in its Python package:
+scripts/race calls it and prints the same JSON.
 """
 import argparse
 import json

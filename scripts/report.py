@@ -2,6 +2,7 @@
 """Make one self-contained HTML page of what regress.py found: pictures, error as colour, tables, plots.
 
     report.py results.json -o report.html
+    report.py results.json --picture nefertiti 0.02 -o compared.png     one case's pictures alone
 
 For each mesh: the original and each tool's output (flat shaded, one camera), under each output its distance to the
 reference as colour (one scale for all tools at one ratio), the table, and rms and Hausdorff against triangles kept.
@@ -22,7 +23,7 @@ import sys
 import matplotlib
 import numpy as np
 import pyvista
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDoubleArray
 from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
@@ -49,12 +50,14 @@ SUMMARY = ["rms_of_diagonal", "mean_of_diagonal", "hausdorff_of_diagonal", "norm
            "megabytes"]
 EXTRA_TRIANGLES = 1.02  # above this multiple of the target an error is not compared with the others'
 EXACT = 1e-9  # of the diagonal; a smaller error is none, and has no logarithm
-# Direction to the camera and up of the meshes that do not stand on z = 0 and face -y.
+# Direction to the camera and up: of meshes that stand on z = 0 and face -y, and of the others.
+VIEW = ((-0.35, -1.0, 0.3), (0.0, 0.0, 1.0))
 Y_UP = ((0.25, 0.2, 1.0), (0.0, 1.0, 0.0))
 FROM_ABOVE = ((-0.35, -1.0, 0.9), (0.0, 0.0, 1.0))
-VIEWS = {"spot": ((0.7, 0.3, -1.0), (0.0, 1.0, 0.0))}
+VIEWS = {"fandisk": ((0.3, 0.5, -1.0), (0.0, 1.0, 0.0)), "rocker-arm": ((1.0, 0.3, 0.4), (0.0, 1.0, 0.0)),
+         "spot": ((0.7, 0.3, -1.0), (0.0, 1.0, 0.0))}
 VIEWS |= dict.fromkeys(("Laurana50k", "bunny", "camelhead", "dragon", "face000", "igea", "igea_sub_1m", "office_chair",
-                        "ogre", "pirate", "rocker-arm", "stanford-bunny", "stanford-dragon"), Y_UP)
+                        "ogre", "pirate", "stanford-bunny", "stanford-dragon"), Y_UP)
 VIEWS |= dict.fromkeys(("conrod", "gears", "thingi10k_99865"), FROM_ABOVE)
 COLORS = matplotlib.colormaps["viridis"]
 ABOVE = "#e8202a"
@@ -73,12 +76,12 @@ h1 { font-size: 28px; margin: 8px 0 } h2 { font-size: 23px; margin: 48px 0 4px; 
   font-variant-numeric: tabular-nums } th, td { padding: 3px 10px; border-bottom: 1px solid #e2e2e2; text-align: right }
 th { font-weight: 600; color: #444; border-bottom-color: #999 } th:first-child, td:first-child { text-align: left }
 td b { color: #000; font-weight: 750 } tr.ours td:first-child { font-weight: 600 } td.off { color: #a40000 }
-.views { display: grid; grid-template-columns: repeat(auto-fill, minmax(236px, 1fr)); gap: 12px }
+.views { display: grid; grid-template-columns: repeat(auto-fill, minmax(196px, 1fr)); gap: 12px }
 figure { margin: 0 } figure img { width: 100%; display: block } figcaption { font-size: 14px; line-height: 1.35;
   text-align: center; margin-bottom: 4px } .note, figcaption span { color: #555 } .note { font-size: 14px }
 .legend { margin: 24px 8px; font-size: 14px } .bar { display: flex; height: 16px; margin: 8px 0 2px }
-.bar i { width: 75% } .bar i + i { width: 25% } .ends { position: relative; height: 1.5em }
-.ends span { position: absolute } .ends .mid { left: 37.5%; transform: translateX(-50%) } .ends .top { left: 75%;
+.bar i { width: 62% } .bar i + i { width: 38% } .ends { position: relative; height: 1.5em }
+.ends span { position: absolute } .ends .mid { left: 31%; transform: translateX(-50%) } .ends .top { left: 62%;
   transform: translateX(-50%) } .ends .more { right: 0 }
 .plots { display: flex; flex-wrap: wrap; gap: 16px } .plots img { width: 620px; max-width: 100% } a { color: #0a4f9c }
 """
@@ -109,7 +112,7 @@ def is_ours(tool):
 class Camera:
     """Looks along one direction at the reference's bounding box, which fills the picture, as render.py does."""
 
-    def __init__(self, mesh, view, up, width):
+    def __init__(self, mesh, view, up, width, max_aspect=1.3):
         bounds = np.array(mesh.bounds).reshape(3, 2)
         self.centre, self.diagonal = bounds.mean(axis=1), np.linalg.norm(bounds[:, 1] - bounds[:, 0])
         self.direction = np.array(view) / np.linalg.norm(view)
@@ -121,11 +124,11 @@ class Camera:
         self.centre = (self.centre + self.right * (across.max() + across.min()) / 2
                        + self.up * (along.max() + along.min()) / 2)
         half_width, half_height = np.ptp(across) / 2, np.ptp(along) / 2
-        aspect = min(max(half_height / half_width, 0.45), 1.3)
+        aspect = min(max(half_height / half_width, 0.45), max_aspect)
         self.size = (width, round(width * aspect))
         self.scale = 1.06 * max(half_height, half_width * aspect)
 
-    def picture(self, mesh, scalars=None, top=None):
+    def image(self, mesh, scalars=None, top=None):
         plotter = pyvista.Plotter(off_screen=True, border=False, lighting="none",
                                   window_size=[SUPERSAMPLES * side for side in self.size])
         plotter.set_background("white")
@@ -146,8 +149,11 @@ class Camera:
                                                      intensity=intensity))
         image = Image.fromarray(plotter.screenshot(return_img=True)).resize(self.size, Image.Resampling.LANCZOS)
         plotter.close()
+        return image
+
+    def jpeg(self, *what):
         data = io.BytesIO()
-        image.save(data, "JPEG", quality=85, optimize=True)
+        self.image(*what).save(data, "JPEG", quality=85, optimize=True)
         return data.getvalue()
 
 
@@ -162,11 +168,15 @@ def ruler(path):
 
 def distances(mesh, distance, diagonal, samples):
     """The mesh, cut finer so that the error inside of large faces shows, and the distance at each of its points."""
-    # A triangle has a twice its area over `samples`, and no edge is much longer than the side of such a one.
-    longest = max(math.sqrt(4 * mesh.area / samples), diagonal * 1e-4)
     fine = mesh.clean(tolerance=0.0).triangulate()
-    fine.points = fine.points.astype(np.float64)  # rounding would turn the normals of the small triangles
+    # Double precision, as rounding would turn the normals of the small triangles, and of size 1 around 0, as VTK's
+    # subdivision tears holes where coordinates are in the hundreds.
+    centre = np.array(fine.center)
+    fine.points = (fine.points.astype(np.float64) - centre) / diagonal
+    # A triangle has at most twice its share of the area, and no edge is much longer than the side of such a one.
+    longest = max(math.sqrt(4 * fine.area / samples), 1e-4)
     fine = fine.subdivide_adaptive(max_edge_len=longest, max_n_passes=12, max_n_tris=8 * samples)
+    fine.points = fine.points * diagonal + centre
     points, found = numpy_to_vtk(np.ascontiguousarray(fine.points, dtype=np.float64)), vtkDoubleArray()
     found.SetNumberOfTuples(fine.n_points)
     distance.FunctionValue(points, found)
@@ -175,7 +185,9 @@ def distances(mesh, distance, diagonal, samples):
 
 def load(output):
     """The output's mesh and a hash of its bytes, or nothing where the tool left none."""
-    path = pathlib.Path(output.get("file") or "")
+    if not output.get("file"):
+        return None, None
+    path = pathlib.Path(output["file"])
     try:
         data = path.read_bytes()
         return render.read(path), hashlib.sha256(data).hexdigest()
@@ -231,8 +243,11 @@ def figure(caption, *pictures, below=""):
     return f"<figure><figcaption>{caption}</figcaption>{images}{below}</figure>"
 
 
-def pictures(case, camera, options):
-    """The figures of a case; as a by-product each output gets the hash of its file."""
+def measure(case, samples):
+    """The reference, and (mesh, the tools' outputs, finer mesh, error at its points) of each file; the colours' top.
+
+    As a by-product each output gets the hash of its file.
+    """
     reference, distance = ruler(case["reference"])
     diagonal = np.linalg.norm(np.diff(np.array(reference.bounds).reshape(3, 2)))
     groups = {}
@@ -240,21 +255,68 @@ def pictures(case, camera, options):
         mesh, output["hash"] = load(output)
         if mesh is not None:
             groups.setdefault(output["hash"], (mesh, []))[1].append(output)
-    measured = [(mesh, outputs, *distances(mesh, distance, diagonal, options.samples))
-                for mesh, outputs in groups.values()]
+    measured = [(mesh, outputs, *distances(mesh, distance, diagonal, samples)) for mesh, outputs in groups.values()]
     # The middle one of the tools decides the scale, so that one bad output does not darken the rest.
     top = float(np.median([np.percentile(error, 99) for *_, error in measured])) if measured else 0.0
-    top = max(top, 1e-7)
+    return reference, measured, max(top, 1e-7)
+
+
+def rms_text(output):
+    rms = valid(output.get("rms_of_diagonal"))
+    return f"rms {number(None if rms is None else rms * 1e4)}"
+
+
+def pictures(case, camera, options):
+    """The figures of a case."""
+    reference, measured, top = measure(case, options.samples)
     figures = [figure(f"original<br><span>{number(reference.n_cells, None)} triangles</span>",
-                      (camera.picture(reference), "original"), below=legend(top))]
+                      (camera.jpeg(reference), "original"), below=legend(top))]
     for mesh, outputs, fine, error in measured:
         title = " = ".join(o["tool"] for o in outputs)
-        rms = valid(outputs[0].get("rms_of_diagonal"))
-        caption = (f"{html.escape(title)}<br><span>{number(mesh.n_cells, None)} triangles, rms "
-                   f"{number(None if rms is None else rms * 1e4)}</span>")
-        figures.append(figure(caption, (camera.picture(mesh), f"output of {title}"),
-                              (camera.picture(fine, error, top), f"error of {title}")))
+        caption = (f"{html.escape(title)}<br><span>{number(mesh.n_cells, None)} triangles, {rms_text(outputs[0])}"
+                   "</span>")
+        figures.append(figure(caption, (camera.jpeg(mesh), f"output of {title}"),
+                              (camera.jpeg(fine, error, top), f"error of {title}")))
     return f"<div class=views>{''.join(figures)}</div>"
+
+
+def picture(case, view, options):
+    """The figures of a case as one image, a column each; legible at half its size."""
+    reference, measured, top = measure(case, options.samples)
+    camera = Camera(reference, *view, options.width, max_aspect=2.0)
+    width, height = camera.size
+    size = width // 12
+    fonts = [ImageFont.truetype(pathlib.Path(matplotlib.get_data_path()) / f"fonts/ttf/{name}.ttf", size)
+             for name in ("DejaVuSans-Bold", "DejaVuSans")]
+    line = round(1.3 * size)
+    head = 3 * line + size
+    image = Image.new("RGB", (width * (1 + len(measured)), head + 2 * height + size), "white")
+    draw = ImageDraw.Draw(image)
+
+    def column(k, texts, *images):
+        for row, text in enumerate(texts):
+            draw.text(((k + 0.5) * width, row * line + size // 3), text, "#1c1c1c", fonts[min(row, 1)], anchor="ma")
+        for row, part in enumerate(images):
+            image.paste(part, (k * width, head + row * (height + size)))
+
+    def triangles(mesh):
+        return f"{number(mesh.n_cells, None)} triangles"
+
+    column(0, ["original", triangles(reference)], camera.image(reference))
+    for k, (mesh, outputs, fine, error) in enumerate(measured, 1):
+        name = "decimate" if is_ours(outputs[0]["tool"]) else " = ".join(o["tool"] for o in outputs)
+        column(k, [name, triangles(mesh), rms_text(outputs[0])], camera.image(mesh), camera.image(fine, error, top))
+    # The scale stands under the original, which has no error.
+    left, right, above = size, width - size, head + height + size + height // 3
+    middle = left + (right - left) * 3 // 5
+    for row, text in enumerate(["distance to the", "original, 10⁻⁴", "of the diagonal"]):
+        draw.text((width / 2, above + (row - 3) * line - size // 2), text, "#1c1c1c", fonts[1], anchor="ma")
+    for x in range(left, right):
+        color = matplotlib.colors.to_hex(COLORS((x - left) / (middle - left))) if x < middle else ABOVE
+        draw.line((x, above, x, above + size), color)
+    for x, text, anchor in ((left, "0", "la"), (middle, number(top * 1e4), "ma"), (right, "more", "ra")):
+        draw.text((x, above + size * 5 // 4), text, "#1c1c1c", fonts[1], anchor=anchor)
+    return image
 
 
 def plot(cases, key, name):
@@ -366,9 +428,11 @@ def prepare(cases):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("results", type=pathlib.Path, metavar="RESULTS.json", help="written by regress.py")
-    parser.add_argument("-o", "--output", type=pathlib.Path, required=True, metavar="OUT.html")
+    parser.add_argument("-o", "--output", type=pathlib.Path, required=True, metavar="OUT")
+    parser.add_argument("--picture", nargs=2, metavar=("MESH", "RATIO"),
+                        help="instead of the page a PNG of this case, the mesh by its name without suffix")
     parser.add_argument("--title", default="decimate beside other simplifiers")
-    parser.add_argument("--width", type=int, default=400, help="of each picture, in pixels (default 400)")
+    parser.add_argument("--width", type=int, default=400, help="of each view, in pixels (default 400)")
     parser.add_argument("--samples", type=int, default=30_000,
                         help="triangles that the error is coloured on, at least (default 30000)")
     parser.add_argument("--view", nargs=7, action="append", default=[],
@@ -379,12 +443,27 @@ def main():
     views = VIEWS | {name: (tuple(map(float, v[:3])), tuple(map(float, v[3:]))) for name, *v in options.view}
 
     groups = prepare(json.loads(options.results.read_text())["cases"])
+    if options.picture:
+        name, ratio = options.picture
+        try:
+            ratio = float(ratio)
+        except ValueError:
+            parser.error(f"--picture: {ratio} is no ratio")
+        case = next((c for group in groups.values() for c in group if (c["name"], c["ratio"]) == (name, ratio)), None)
+        if case is None:
+            parser.error(f"--picture: no {name} at {ratio:g} in {options.results}")
+        # The method that keeps the scale's rare colours as well as the shades.
+        image = picture(case, views.get(name, VIEW), options).quantize(
+            method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        image.save(options.output, "PNG", optimize=True)
+        print(f"{options.output}: {options.output.stat().st_size} bytes", file=sys.stderr)
+        return
     sections = []
     for path, cases in groups.items():
         name = cases[0]["name"]
         print(name, file=sys.stderr)
         reference, _ = ruler(cases[0]["reference"])
-        camera = Camera(reference, *views.get(name, ((-0.35, -1.0, 0.3), (0.0, 0.0, 1.0))), options.width)
+        camera = Camera(reference, *views.get(name, VIEW), options.width)
         parts = [f"<h3>{case['ratio'] * 100:g} % kept</h3>{pictures(case, camera, options)}"
                  f"{table(case['outputs'], case['target'])}" for case in cases]
         plots = "".join(plot(cases, key, heading) for key, heading in
