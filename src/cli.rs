@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use decimate::decimate::{Boundary, Options, Placement, Targets, TierChoice};
+use decimate::decimate::{Boundary, Options, Placement, Quality, Targets, TierChoice};
 use decimate::io::Format;
 use decimate::mesh::Tier;
 
@@ -117,6 +117,17 @@ pub struct Run {
     )]
     pub max_error: Option<f64>,
 
+    /// How near to come to the original, for how much time.
+    #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
+    pub quality: QualityArg,
+    /// Keep edges at which the surface turns by more than this many degrees as curves.
+    #[arg(
+        long,
+        value_name = "DEG",
+        allow_negative_numbers = true,
+        help_heading = "Surface"
+    )]
+    pub feature_angle: Option<f64>,
     /// What may happen to boundaries.
     #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
     pub boundary: BoundaryArg,
@@ -166,6 +177,18 @@ pub struct Run {
     pub check: bool,
 }
 
+/// `--quality`.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum QualityArg {
+    /// Half the time, twice the error
+    Fast,
+    /// Nearer than other simplifiers
+    #[default]
+    Standard,
+    /// Fitted to the original: half as much time again for a fifth less error
+    Best,
+}
+
 /// `--boundary`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub enum BoundaryArg {
@@ -211,6 +234,12 @@ impl Run {
                 triangles: self.triangles,
                 max_error: self.max_error,
             },
+            quality: match self.quality {
+                QualityArg::Fast => Quality::Fast,
+                QualityArg::Standard => Quality::Standard,
+                QualityArg::Best => Quality::Best,
+            },
+            feature_angle_degrees: self.feature_angle,
             boundary: match self.boundary {
                 BoundaryArg::Keep => Boundary::Keep,
                 BoundaryArg::Lock => Boundary::Lock,

@@ -17,7 +17,10 @@ const ARROWS: [(&str, &[&str]); 8] = [
     ("nearest", &[]),
     ("clean", &["error", "indexed_mesh"]),
     ("io", &["error", "indexed_mesh"]),
-    ("decimate", &["error", "indexed_mesh", "clean", "mesh"]),
+    (
+        "decimate",
+        &["error", "indexed_mesh", "clean", "mesh", "nearest"],
+    ),
     (
         "metrics",
         &["error", "indexed_mesh", "clean", "mesh", "nearest"],

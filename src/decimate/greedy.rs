@@ -6,12 +6,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::cost::{Cost, Evaluation};
-use super::geometry::Geometry;
 use super::queue::{Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
 use super::rules;
+use super::surface::{Merged, Surface};
 use crate::error::{Error, Result};
-use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
+use crate::mesh::{EdgeId, EdgeStore, FaceId, VertexId};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -33,18 +33,11 @@ enum Rejection {
     Error,
 }
 
-/// A mesh being decimated: connectivity, geometry and what is carried along, under one cost.
+/// A surface being decimated under one cost.
 pub struct Greedy<'a, S, C, Q> {
-    mesh: &'a mut Mesh<S>,
-    geometry: &'a mut Geometry,
+    surface: &'a mut Surface<S>,
     cost: C,
     queue: Q,
-    /// One flag a vertex that must not move, or nothing where all may.
-    locked: Vec<bool>,
-    /// One flag a face that counts as two, or nothing where none does.
-    double_sided: &'a [bool],
-    /// An estimate of how far each vertex is from the original, in the unit box.
-    deviation: Vec<f32>,
     /// The number of collapses before each vertex's surroundings last changed.
     changed_at: Vec<u32>,
     /// The edges to evaluate after a collapse; kept for its memory.
@@ -55,48 +48,44 @@ pub struct Greedy<'a, S, C, Q> {
 }
 
 impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
-    /// Evaluates every edge, in parallel.
-    pub fn new(
-        mesh: &'a mut Mesh<S>,
-        geometry: &'a mut Geometry,
-        cost: C,
-        locked: Vec<bool>,
-        double_sided: &'a [bool],
-    ) -> Self {
-        let slots = mesh.vertex_slots();
-        let triangles = mesh.face_count() + double_sided.iter().filter(|&&d| d).count();
+    /// Evaluates every edge, in parallel. Counting goes on from `tally`.
+    pub fn new(surface: &'a mut Surface<S>, cost: C, tally: Tally) -> Self {
+        let slots = surface.mesh.vertex_slots();
+        let triangles = surface.triangles();
         let mut greedy = Self {
-            mesh,
-            geometry,
+            surface,
             cost,
             queue: Q::from_candidates(Vec::new()),
-            locked,
-            double_sided,
-            deviation: vec![0.0; slots],
             changed_at: vec![0; slots],
             edges: Vec::new(),
             triangles,
             max_error: None,
-            tally: Tally::default(),
+            tally,
         };
-        let this = &greedy;
+        greedy.tally.rejected_lock = greedy.locked_edges();
+        greedy.queue = Q::from_candidates(greedy.candidates(|_| true));
+        greedy
+    }
+
+    /// The candidates of all edges that `choose` takes, in parallel.
+    fn candidates(&self, choose: impl Fn(&Candidate) -> bool + Sync) -> Vec<Candidate> {
+        let mesh = &self.surface.mesh;
         // In blocks, so that no second copy of all candidates is held.
-        let mut candidates: Vec<Candidate> = Vec::with_capacity(3 * this.mesh.face_count() / 2);
-        let slots = this.mesh.face_slots();
+        let mut candidates: Vec<Candidate> = Vec::with_capacity(3 * mesh.face_count() / 2);
+        let slots = mesh.face_slots();
         for first in (0..slots).step_by(BLOCK_FACES) {
             let block: Vec<Candidate> = (first..slots.min(first + BLOCK_FACES))
                 .into_par_iter()
                 .map(FaceId::new)
-                .filter(|&f| this.mesh.is_live_face(f))
+                .filter(|&f| mesh.is_live_face(f))
                 .flat_map_iter(|f| f.edges().into_iter())
-                .filter(|&e| this.mesh.canonical(e) == e)
-                .filter_map(|e| this.candidate(e))
+                .filter(|&e| mesh.canonical(e) == e)
+                .filter_map(|e| self.candidate(e))
+                .filter(&choose)
                 .collect();
             candidates.extend(block);
         }
-        greedy.tally.rejected_lock = greedy.locked_edges();
-        greedy.queue = Q::from_candidates(candidates);
-        greedy
+        candidates
     }
 
     /// Collapses until a target is reached or nothing is left to collapse.
@@ -117,6 +106,9 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         self.note_bytes();
         while self.triangles > stop.triangles {
             let Some(candidate) = self.queue.pop() else {
+                if self.revive() {
+                    continue;
+                }
                 return Ok(self.blocked());
             };
             if !self.is_fresh(&candidate) {
@@ -131,14 +123,14 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 Some(Rejection::Flip) => self.tally.rejected_flip += 1,
                 Some(Rejection::Error) => self.tally.rejected_error += 1,
                 None => {
-                    let collapse = self.collapse(e, position);
+                    let merged = self.collapse(e, position);
                     if check {
-                        self.mesh.check().map_err(|wrong| {
-                            Error::Internal(format!("after {collapse:?}: {wrong}"))
+                        self.surface.mesh.check().map_err(|wrong| {
+                            Error::Internal(format!("after {:?}: {wrong}", merged.collapse))
                         })?;
                     }
                     self.cost
-                        .after_collapse(self.mesh, self.geometry, &collapse, &mut changed);
+                        .after_collapse(self.surface, &merged, &mut changed);
                     self.reconsider(&changed);
                     if self.tally.collapses.is_multiple_of(1024)
                         && progress(self.triangles).is_break()
@@ -151,29 +143,14 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         Ok((StopReason::Target, None))
     }
 
-    /// The triangles left, double-sided ones counted as two.
-    pub fn triangles(&self) -> usize {
-        self.triangles
-    }
 
     /// What was counted so far.
     pub fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// The largest estimated distance of a live vertex from the original, in the unit box.
-    pub fn max_deviation(&self) -> f64 {
-        let deviations = self.mesh.vertices().map(|v| self.deviation[v.index()]);
-        f64::from(deviations.fold(0.0, f32::max))
-    }
-
-    fn is_locked(&self, v: VertexId) -> bool {
-        self.locked.get(v.index()).copied().unwrap_or(false)
-    }
-
     fn evaluate(&self, e: EdgeId) -> Option<Evaluation> {
-        let held = self.mesh.edge_vertices(e).map(|v| self.is_locked(v));
-        self.cost.evaluate(self.mesh, self.geometry, e, held)
+        self.cost.evaluate(self.surface, e, self.surface.held(e))
     }
 
     fn candidate(&self, edge: EdgeId) -> Option<Candidate> {
@@ -189,17 +166,23 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     fn is_fresh(&self, candidate: &Candidate) -> bool {
         let e = candidate.edge;
         let unchanged = |v: VertexId| self.changed_at[v.index()] <= candidate.evaluated_at;
-        self.mesh.is_live_face(e.face()) && self.mesh.edge_vertices(e).into_iter().all(unchanged)
+        self.surface.mesh.is_live_face(e.face())
+            && self
+                .surface
+                .mesh
+                .edge_vertices(e)
+                .into_iter()
+                .all(unchanged)
     }
 
     fn rejection(&self, e: EdgeId, position: Vec3) -> Option<Rejection> {
-        if !self.mesh.link_condition(e) {
+        if !self.surface.mesh.link_condition(e) || !self.surface.crease_condition(e) {
             Some(Rejection::Link)
-        } else if rules::turns_a_face(self.mesh, self.geometry, e, position) {
+        } else if rules::turns_a_face(&self.surface.mesh, &self.surface.geometry, e, position) {
             Some(Rejection::Flip)
         } else if self
             .max_error
-            .is_some_and(|limit| self.deviation_after(e, position) > limit)
+            .is_some_and(|limit| self.surface.deviation_after(e, position) > limit)
         {
             Some(Rejection::Error)
         } else {
@@ -207,41 +190,20 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
     }
 
-    /// The deviation that the merged vertex would have: a memoryless cost forgets, so each vertex
-    /// carries the sum of what its collapses moved away from the planes at hand.
-    fn deviation_after(&self, e: EdgeId, position: Vec3) -> f64 {
-        let [v, w] = self
-            .mesh
-            .edge_vertices(e)
-            .map(|v| self.deviation[v.index()]);
-        f64::from(v.max(w)) + rules::distance_from_star(self.mesh, self.geometry, e, position)
-    }
-
-    fn collapse(&mut self, e: EdgeId, position: Vec3) -> Collapse {
-        let ends = self.mesh.edge_vertices(e);
-        let star = self.mesh.edge_star(e);
-        let apexes = star.iter().map(|&d| self.mesh.apex(d));
+    fn collapse(&mut self, e: EdgeId, position: Vec3) -> Merged {
+        let mesh = &self.surface.mesh;
+        let ends = mesh.edge_vertices(e);
+        let star = mesh.edge_star(e);
+        let apexes = star.iter().map(|&d| mesh.apex(d));
         let mut touched = ends.into_iter().chain(apexes);
-        if touched.any(|v| self.mesh.is_non_manifold_vertex(v)) {
+        if touched.any(|v| mesh.is_non_manifold_vertex(v)) {
             self.tally.collapses_non_manifold += 1;
         }
-        let deviation = self.deviation_after(e, position);
-        let collapse = self.mesh.collapse(e);
-        self.geometry.set_position(collapse.kept, position);
-        if self.is_locked(collapse.removed) {
-            self.locked[collapse.kept.index()] = true;
-        }
-        self.deviation[collapse.kept.index()] = deviation as f32;
-        let sides = |f: &FaceId| {
-            if self.double_sided.get(f.index()) == Some(&true) {
-                2
-            } else {
-                1
-            }
-        };
-        self.triangles -= collapse.dead_faces.iter().map(sides).sum::<usize>();
+        let merged = self.surface.collapse(e, position);
+        let dead = merged.collapse.dead_faces.iter();
+        self.triangles -= dead.map(|&f| self.surface.sides(f)).sum::<usize>();
         self.tally.collapses += 1;
-        collapse
+        merged
     }
 
     /// Evaluates every edge at the changed vertices, each once.
@@ -253,14 +215,14 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         let mut edges = std::mem::take(&mut self.edges);
         edges.clear();
         for &v in changed {
-            for start in self.mesh.fans(v) {
+            for start in self.surface.mesh.fans(v) {
                 let mut end = start;
-                for e in self.mesh.fan(start) {
-                    edges.extend(self.name_at(v, self.mesh.head(e), e, now));
-                    end = self.mesh.prev(e);
+                for e in self.surface.mesh.fan(start) {
+                    edges.extend(self.name_at(v, self.surface.mesh.head(e), e, now));
+                    end = self.surface.mesh.prev(e);
                 }
-                if self.mesh.mate(start).is_none() {
-                    edges.extend(self.name_at(v, self.mesh.tail(end), end, now));
+                if self.surface.mesh.mate(start).is_none() {
+                    edges.extend(self.name_at(v, self.surface.mesh.tail(end), end, now));
                 }
             }
         }
@@ -271,7 +233,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
         self.edges = edges;
         // Stale candidates stay in the queue until they outnumber the fresh ones.
-        if self.queue.len() > 3 * self.mesh.face_count() + 1024 {
+        if self.queue.len() > 3 * self.surface.mesh.face_count() + 1024 {
             self.note_bytes();
             let mut queue = std::mem::replace(&mut self.queue, Q::from_candidates(Vec::new()));
             queue.retain(|candidate| self.is_fresh(candidate));
@@ -283,9 +245,20 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     /// changed) or another directed edge's (several at `v`).
     fn name_at(&self, v: VertexId, other: VertexId, e: EdgeId, now: u32) -> Option<EdgeId> {
         let is_others_turn = self.changed_at[other.index()] == now && other < v;
-        let name = self.mesh.canonical(e);
-        let is_once = name == e || self.mesh.mate(e).is_some();
+        let name = self.surface.mesh.canonical(e);
+        let is_once = name == e || self.surface.mesh.mate(e).is_some();
         (!is_others_turn && is_once).then_some(name)
+    }
+
+    /// Puts what can be collapsed after all back into the queue: what was refused once and has not
+    /// been evaluated since, because no cost around it changed. Whether there is anything.
+    fn revive(&mut self) -> bool {
+        let can_collapse = |c: &Candidate| {
+            self.evaluate(c.edge)
+                .is_some_and(|e| self.rejection(c.edge, e.position).is_none())
+        };
+        self.queue = Q::from_candidates(self.candidates(can_collapse));
+        self.queue.len() > 0
     }
 
     /// Why nothing is left to collapse: the reason of every edge that is left.
@@ -294,7 +267,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             lock: self.locked_edges(),
             ..Blocked::default()
         };
-        for e in self.mesh.edges() {
+        for e in self.surface.mesh.edges() {
             let Some(Evaluation { position, .. }) = self.evaluate(e) else {
                 continue;
             };
@@ -313,24 +286,20 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         (reason, Some(blocked))
     }
 
+    /// The edges that no collapse is asked of, since both ends are held.
     fn locked_edges(&self) -> usize {
-        if self.locked.is_empty() {
+        if self.surface.locked.is_empty() && self.surface.creases.is_empty() {
             return 0;
         }
-        let both = |&e: &EdgeId| {
-            self.mesh
-                .edge_vertices(e)
-                .into_iter()
-                .all(|v| self.is_locked(v))
-        };
-        self.mesh.edges().filter(both).count()
+        let is_held = |&e: &EdgeId| self.surface.held(e) == [true; 2];
+        self.surface.mesh.edges().filter(is_held).count()
     }
 
     /// Notes the bytes held now, where they are the most so far.
     fn note_bytes(&mut self) {
         let bytes = self.queue.bytes()
             + self.cost.bytes()
-            + self.deviation.capacity() * size_of::<f32>()
+            + self.surface.carried_bytes()
             + self.changed_at.capacity() * size_of::<u32>();
         self.tally.working_bytes = self.tally.working_bytes.max(bytes);
     }

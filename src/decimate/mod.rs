@@ -1,13 +1,16 @@
 //! From one mesh to another with fewer triangles.
 
 mod cost;
+mod fit;
 mod geometry;
 mod greedy;
 mod memory;
 mod options;
+mod original;
 mod queue;
 mod report;
 mod rules;
+mod surface;
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -18,13 +21,16 @@ use crate::indexed_mesh::IndexedMesh;
 use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
-pub use options::{Boundary, Options, Placement, Targets, TierChoice};
+pub use options::{Boundary, Options, Placement, Quality, Targets, TierChoice};
 pub use report::{Blocked, Report, StopReason, Tally};
 
-use cost::Memoryless;
+use cost::{Accumulated, Cost, Memoryless};
+use fit::Fit;
 use geometry::Geometry;
 use greedy::{Greedy, Stop};
+use original::Original;
 use queue::LazyHeap;
+use surface::Surface;
 
 /// How far decimation has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,43 +131,61 @@ fn run<S: EdgeStore>(
 ) -> Result<IndexedMesh> {
     let start = Instant::now();
     let diagonal = input.diagonal();
-    let (origin, positions, triangles, mut double_sided) = input.into_parts();
+    let (origin, positions, triangles, double_sided) = input.into_parts();
     let Oriented {
-        mut mesh,
-        mut flipped,
-        ..
+        mesh, mut flipped, ..
     } = Mesh::<S>::oriented(positions.len(), triangles);
-    let mut geometry = Geometry::new(positions, diagonal);
-    report.mesh_bytes = mesh.bytes() + geometry.bytes();
-    report.non_manifold_edges_in = mesh.non_manifold_edge_count();
+    let mut surface = Surface {
+        locked: Vec::new(),
+        creases: Vec::new(),
+        weights: Vec::new(),
+        deviation: vec![0.0; mesh.vertex_slots()],
+        geometry: Geometry::new(positions, diagonal),
+        mesh,
+        double_sided,
+    };
+    report.mesh_bytes = surface.mesh_bytes();
+    report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
     report.reoriented_faces = flipped.iter().filter(|&&f| f).count();
     report.build_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
-    let locked = match options.boundary {
-        Boundary::Lock => boundary_vertices(&mesh),
-        Boundary::Keep | Boundary::Free => Vec::new(),
-    };
-    let cost = Memoryless::new(&mesh, &geometry, options.boundary, options.placement);
-    let scale = geometry.scale();
-    let mut greedy =
-        Greedy::<_, _, LazyHeap>::new(&mut mesh, &mut geometry, cost, locked, &double_sided);
+    if options.boundary == Boundary::Lock {
+        surface.lock_boundary();
+    }
+    if let Some(degrees) = options.feature_angle_degrees {
+        surface.mark_creases(degrees);
+    }
+    let scale = surface.geometry.scale();
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),
     };
-    let triangles_start = greedy.triangles();
+    let triangles_start = surface.triangles();
     let triangles_target = stop.triangles.min(triangles_start);
-    let (reason, blocked) = greedy.run(stop, options.check, &mut |triangles| {
-        progress(Progress {
-            triangles_start,
-            triangles,
-            triangles_target,
-        })
-    })?;
-    report.tally = greedy.tally();
-    report.max_error_estimate = greedy.max_deviation() / scale;
-    report.triangles_out = greedy.triangles();
+    let mut job = Job {
+        options,
+        tally: Tally::default(),
+        progress: &mut |triangles| {
+            progress(Progress {
+                triangles_start,
+                triangles,
+                triangles_target,
+            })
+        },
+    };
+    let (reason, blocked) = match options.quality {
+        Quality::Fast => job.collapse(&mut surface, stop, |surface| {
+            Accumulated::new(surface, options.boundary, options.placement)
+        }),
+        Quality::Standard => job.collapse(&mut surface, stop, |surface| {
+            Memoryless::new(surface, options.boundary, options.placement)
+        }),
+        Quality::Best => job.collapse_and_fit(&mut surface, stop),
+    }?;
+    report.tally = job.tally;
+    report.max_error_estimate = surface.max_deviation() / scale;
+    report.triangles_out = surface.triangles();
     report.stop_reason = reason;
     report.blocked = blocked;
     // An error alone is no target to fall short of, and reaching it is no falling short.
@@ -171,8 +195,13 @@ fn run<S: EdgeStore>(
         StopReason::Blocked => wanted,
         StopReason::Cancelled => true,
     };
-    drop(greedy);
 
+    let Surface {
+        mut mesh,
+        geometry,
+        mut double_sided,
+        ..
+    } = surface;
     let map = mesh.compact();
     let mut positions = geometry.into_positions();
     Compaction::retain(&map.vertices, &mut positions);
@@ -188,16 +217,92 @@ fn run<S: EdgeStore>(
     Ok(output)
 }
 
-/// A flag for each vertex that lies on a boundary edge.
-fn boundary_vertices<S: EdgeStore>(mesh: &Mesh<S>) -> Vec<bool> {
-    let mut on_boundary = vec![false; mesh.vertex_slots()];
-    for e in mesh.edges().filter(|&e| mesh.is_boundary(e)) {
-        for v in mesh.edge_vertices(e) {
-            on_boundary[v.index()] = true;
+type Stopped = (StopReason, Option<Blocked>);
+
+/// What a run goes by, and what it counts.
+struct Job<'a> {
+    options: &'a Options,
+    tally: Tally,
+    progress: &'a mut dyn FnMut(usize) -> ControlFlow<()>,
+}
+
+impl Job<'_> {
+    /// Collapses under one cost.
+    fn collapse<S: EdgeStore, C: Cost<S>>(
+        &mut self,
+        surface: &mut Surface<S>,
+        stop: Stop,
+        cost: impl FnOnce(&Surface<S>) -> C,
+    ) -> Result<Stopped> {
+        let cost = cost(surface);
+        let mut greedy = Greedy::<_, _, LazyHeap>::new(surface, cost, self.tally);
+        let stopped = greedy.run(stop, self.options.check, self.progress)?;
+        self.tally = greedy.tally();
+        Ok(stopped)
+    }
+
+    /// Collapses and fits in turns: a vertex that has been fitted gives the planes around it back
+    /// something of the original, of which the cost remembers nothing.
+    fn collapse_and_fit<S: EdgeStore>(
+        &mut self,
+        surface: &mut Surface<S>,
+        stop: Stop,
+    ) -> Result<Stopped> {
+        let options = self.options;
+        let with_boundary = options.boundary == Boundary::Keep;
+        let original = Original::new(&surface.mesh, surface.geometry.positions(), with_boundary);
+        loop {
+            let triangles = surface.triangles();
+            let half = triangles / 2;
+            let stage = if (half as f64) < LAST_STAGE * stop.triangles as f64 {
+                stop.triangles
+            } else {
+                half
+            };
+            let stage_stop = Stop {
+                triangles: stage,
+                ..stop
+            };
+            let stopped = self.collapse(surface, stage_stop, |surface| {
+                Memoryless::new(surface, options.boundary, options.placement)
+            })?;
+            if stopped.0 == StopReason::Cancelled {
+                return Ok(stopped);
+            }
+            let is_last = surface.triangles() <= stop.triangles
+                || surface.triangles() as f64 > STUCK * triangles as f64;
+            let mut fit = Fit::new(surface, &original, options.targets.max_error);
+            self.tally.working_bytes = self.tally.working_bytes.max(original.bytes() + fit.bytes());
+            for round in 0..if is_last { ROUNDS } else { 1 } {
+                if round > 0 {
+                    fit.reassign();
+                }
+                if is_last {
+                    fit.flip_edges();
+                }
+                for _ in 0..if is_last { SWEEPS } else { 1 } {
+                    fit.move_vertices();
+                }
+            }
+            fit.finish();
+            if is_last {
+                return Ok(stopped);
+            }
         }
     }
-    on_boundary
 }
+
+/// The last stage begins where this many times the target would be left.
+const LAST_STAGE: f64 = 1.3;
+
+/// A stage that leaves more than this of the triangles was the last.
+const STUCK: f64 = 0.95;
+
+/// Rounds of flips and sweeps at the end. One costs 1.3 % of rms, six save 0.4 %.
+const ROUNDS: usize = 3;
+
+/// Sweeps over the vertices in a round.
+const SWEEPS: usize = 2;
 
 #[cfg(test)]
 mod tests;

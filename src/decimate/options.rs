@@ -15,6 +15,19 @@ pub struct Targets {
     pub max_error: Option<f64>,
 }
 
+/// How much time to spend on how near the result is to the original.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Quality {
+    /// Quadrics of the original's planes, added up (Garland & Heckbert 1997): half the time.
+    Fast,
+    /// Planes, folds and volume of the surface as it is (after Lindstrom & Turk 1999).
+    #[default]
+    Standard,
+    /// The same, and the result is fitted to the original: twice the time.
+    Best,
+}
+
 /// What may happen to the boundary. The topology of its loops is kept in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -54,10 +67,14 @@ pub enum TierChoice {
 pub struct Options {
     /// When to stop.
     pub targets: Targets,
+    /// How near to come, for how much time.
+    pub quality: Quality,
     /// What may happen to the boundary.
     pub boundary: Boundary,
     /// Where merged vertices go.
     pub placement: Placement,
+    /// Edges at which the surface turns by more than this are kept as curves; none where not given.
+    pub feature_angle_degrees: Option<f64>,
     /// The memory tier.
     pub tier: TierChoice,
     /// The bytes that decimation may use, for [`TierChoice::Auto`]; the memory that is free where
@@ -73,8 +90,10 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             targets: Targets::default(),
+            quality: Quality::default(),
             boundary: Boundary::default(),
             placement: Placement::default(),
+            feature_angle_degrees: None,
             tier: TierChoice::default(),
             memory_limit_bytes: None,
             weld: true,

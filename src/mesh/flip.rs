@@ -27,8 +27,9 @@ impl<S: EdgeStore> Mesh<S> {
     ///        d                    d
     /// ```
     ///
-    /// Needs [`flip_condition(e)`](Self::flip_condition). Constant time.
-    pub fn flip(&mut self, e: EdgeId) {
+    /// Returns the directed edges of the four sides, each before and after, for what is carried
+    /// along by them. Needs [`flip_condition(e)`](Self::flip_condition). Constant time.
+    pub fn flip(&mut self, e: EdgeId) -> [(EdgeId, EdgeId); 4] {
         debug_assert!(self.flip_condition(e), "flip of {e:?} would fold the mesh");
         let Opposite::Edge(o) = self.opposite(e) else {
             unreachable!("the flip condition asks for two faces")
@@ -84,5 +85,6 @@ impl<S: EdgeStore> Mesh<S> {
                 _ => {}
             }
         }
+        sides
     }
 }

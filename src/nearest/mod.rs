@@ -13,7 +13,7 @@ mod triangle;
 
 use glam::{DVec3, Vec3, Vec4};
 
-pub use triangle::{Nearest, nearest_on_triangle};
+pub use triangle::{Foot, Nearest, foot_on_triangle, nearest_on_triangle};
 
 /// Triangles in a subtree that is worth a thread of its own.
 const PARALLEL: usize = 1 << 15;
@@ -222,6 +222,13 @@ impl Triangles {
     /// Whether there is no triangle.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
+    }
+
+    /// The bytes held.
+    pub fn bytes(&self) -> usize {
+        self.corners.capacity() * size_of::<[DVec3; 3]>()
+            + self.names.capacity() * size_of::<u32>()
+            + self.nodes.capacity() * size_of::<Node>()
     }
 
     /// The triangles' indices in the caller's list, in the set's own order: neighbours are near.

@@ -27,62 +27,94 @@ impl Nearest {
     }
 }
 
-/// The point of a triangle (or of the segment or point that it degenerates to) nearest to `p`
-/// (Ericson 2005, *Real-Time Collision Detection*, 5.1.5).
+/// The nearest point of one triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// The point.
+    pub point: DVec3,
+    /// Its barycentric coordinates; zero, exactly, for a corner that it is across from.
+    pub weights: [f64; 3],
+}
+
+impl Foot {
+    /// Whether the point lies on no side of the triangle.
+    pub fn is_inside(&self) -> bool {
+        self.weights.iter().all(|&w| w > 0.0)
+    }
+}
+
+/// The point of a triangle (or of the segment or point that it degenerates to) nearest to `p`.
 #[inline]
-pub fn nearest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
+pub fn nearest_on_triangle(p: DVec3, triangle: &[DVec3; 3]) -> DVec3 {
+    foot_on_triangle(p, triangle).point
+}
+
+/// [`nearest_on_triangle`] with its barycentric coordinates (Ericson 2005, *Real-Time Collision
+/// Detection*, 5.1.5).
+#[inline(always)]
+pub fn foot_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> Foot {
+    let foot = |point, weights| Foot { point, weights };
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return a;
+        return foot(a, [1.0, 0.0, 0.0]);
     }
     let bp = p - b;
     let (d3, d4) = (ab.dot(bp), ac.dot(bp));
     if d3 >= 0.0 && d4 <= d3 {
-        return b;
+        return foot(b, [0.0, 1.0, 0.0]);
     }
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return a + ab * (d1 / (d1 - d3));
+        let t = d1 / (d1 - d3);
+        return foot(a + ab * t, [1.0 - t, t, 0.0]);
     }
     let cp = p - c;
     let (d5, d6) = (ab.dot(cp), ac.dot(cp));
     if d6 >= 0.0 && d5 <= d6 {
-        return c;
+        return foot(c, [0.0, 0.0, 1.0]);
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return a + ac * (d2 / (d2 - d6));
+        let t = d2 / (d2 - d6);
+        return foot(a + ac * t, [1.0 - t, 0.0, t]);
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return foot(b + (c - b) * t, [0.0, 1.0 - t, t]);
     }
     let denominator = va + vb + vc;
     let (v, w) = (vb / denominator, vc / denominator);
     let point = a + ab * v + ac * w;
     if point.is_finite() {
-        point
+        foot(point, [1.0 - v - w, v, w])
     } else {
-        nearest_on_sides(p, &[a, b, c])
+        foot_on_sides(p, &[a, b, c])
     }
 }
 
 /// The nearest point of the three sides: for triangles so thin that their plane is noise.
 #[cold]
-fn nearest_on_sides(p: DVec3, corners: &[DVec3; 3]) -> DVec3 {
-    let mut best = corners[0];
+fn foot_on_sides(p: DVec3, corners: &[DVec3; 3]) -> Foot {
+    let mut best = Foot {
+        point: corners[0],
+        weights: [1.0, 0.0, 0.0],
+    };
     for i in 0..3 {
-        let (a, b) = (corners[i], corners[(i + 1) % 3]);
-        let along = b - a;
-        let t = along.dot(p - a) / along.length_squared();
-        let point = if t.is_finite() {
-            a + along * t.clamp(0.0, 1.0)
+        let j = (i + 1) % 3;
+        let along = corners[j] - corners[i];
+        let t = along.dot(p - corners[i]) / along.length_squared();
+        let t = if t.is_finite() {
+            t.clamp(0.0, 1.0)
         } else {
-            a
+            0.0
         };
-        if point.distance_squared(p) < best.distance_squared(p) {
-            best = point;
+        let point = corners[i] + along * t;
+        if point.distance_squared(p) < best.point.distance_squared(p) {
+            let mut weights = [0.0; 3];
+            (weights[i], weights[j]) = (1.0 - t, t);
+            best = Foot { point, weights };
         }
     }
     best

@@ -1,0 +1,218 @@
+//! A mesh being decimated: connectivity, geometry and what is carried along.
+
+use glam::Vec3;
+use smallvec::SmallVec;
+
+use super::geometry::Geometry;
+use super::rules;
+use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
+
+/// A collapse, and where its ends were.
+pub struct Merged {
+    /// What happened to the mesh.
+    pub collapse: Collapse,
+    /// The positions before of the vertex that is gone and of the one that is left.
+    pub from: [Vec3; 2],
+}
+
+/// A mesh being decimated and all that is carried along by its slots.
+pub struct Surface<S> {
+    /// Which triangles meet where.
+    pub mesh: Mesh<S>,
+    /// Where the vertices are.
+    pub geometry: Geometry,
+    /// One flag a vertex that must not move, or nothing where all may.
+    pub locked: Vec<bool>,
+    /// One flag a face that counts as two, or nothing where none does.
+    pub double_sided: Vec<bool>,
+    /// One flag a directed edge that is kept as part of a curve, or nothing where none is.
+    pub creases: Vec<bool>,
+    /// What the cost is multiplied by around each vertex, or nothing where by 1.
+    pub weights: Vec<f32>,
+    /// An estimate of how far each vertex is from the original, in the unit box.
+    pub deviation: Vec<f32>,
+}
+
+impl<S: EdgeStore> Surface<S> {
+    /// Whether the vertex must not move.
+    #[inline]
+    pub fn is_locked(&self, v: VertexId) -> bool {
+        self.locked.get(v.index()) == Some(&true)
+    }
+
+    /// Locks a vertex.
+    pub fn lock(&mut self, v: VertexId) {
+        self.locked.resize(self.mesh.vertex_slots(), false);
+        self.locked[v.index()] = true;
+    }
+
+    /// Locks the vertices on boundary edges.
+    pub fn lock_boundary(&mut self) {
+        let mut locked = vec![false; self.mesh.vertex_slots()];
+        for e in self.mesh.edges().filter(|&e| self.mesh.is_boundary(e)) {
+            for v in self.mesh.edge_vertices(e) {
+                locked[v.index()] = true;
+            }
+        }
+        self.locked = locked;
+    }
+
+    /// The triangles that a face counts as: two where it is double-sided.
+    #[inline]
+    pub fn sides(&self, f: FaceId) -> usize {
+        1 + usize::from(self.double_sided.get(f.index()) == Some(&true))
+    }
+
+    /// The triangles, double-sided ones counted as two.
+    pub fn triangles(&self) -> usize {
+        if self.double_sided.is_empty() {
+            self.mesh.face_count()
+        } else {
+            self.mesh.faces().map(|f| self.sides(f)).sum()
+        }
+    }
+
+    /// The weight of a vertex.
+    #[inline]
+    pub fn weight(&self, v: VertexId) -> f64 {
+        self.weights.get(v.index()).map_or(1.0, |&w| f64::from(w))
+    }
+
+    /// Whether the edge is kept as part of a curve that is neither boundary nor non-manifold.
+    #[inline]
+    pub fn is_crease(&self, e: EdgeId) -> bool {
+        self.creases.get(e.index()) == Some(&true)
+    }
+
+    /// Marks the edges at which the surface turns by more than `degrees` as creases.
+    pub fn mark_creases(&mut self, degrees: f64) {
+        let (mesh, geometry) = (&self.mesh, &self.geometry);
+        let flattest = degrees.to_radians().cos();
+        let is_sharp = |e: EdgeId| {
+            mesh.mate(e).is_some_and(|o| {
+                let normals = [e, o].map(|e| geometry.normal(mesh, e));
+                let lengths = normals[0].length() * normals[1].length();
+                lengths > 0.0 && normals[0].dot(normals[1]) < flattest * lengths
+            })
+        };
+        let mut creases = vec![false; 3 * mesh.face_slots()];
+        for e in mesh.faces().flat_map(FaceId::edges) {
+            creases[e.index()] = is_sharp(e);
+        }
+        self.creases = creases;
+    }
+
+    /// How many edges at `v` are creases, boundaries or non-manifold: 0 on a smooth piece, 2 on a
+    /// curve, anything else where curves end or meet.
+    pub fn curves_at(&self, v: VertexId) -> usize {
+        let is_curve = |&e: &EdgeId| self.is_crease(e) || self.mesh.mate(e).is_none();
+        self.mesh
+            .vertex_edges(v)
+            .iter()
+            .filter(|e| is_curve(e))
+            .count()
+    }
+
+    /// Which ends of `e` stay where they are if it collapses, tail first.
+    pub fn held(&self, e: EdgeId) -> [bool; 2] {
+        let ends = self.mesh.edge_vertices(e);
+        let mut held = ends.map(|v| self.is_locked(v));
+        if !self.creases.is_empty() {
+            let is_curve = self.is_crease(e) || self.mesh.mate(e).is_none();
+            let free = if is_curve { 2 } else { 0 };
+            for (held, v) in held.iter_mut().zip(ends) {
+                *held |= self.curves_at(v) != free;
+            }
+        }
+        held
+    }
+
+    /// Whether collapsing `e` keeps the creases: no two of them become one. (That no curve is
+    /// pinched or pulled off its ends follows from what is [held](Self::held).)
+    pub fn crease_condition(&self, e: EdgeId) -> bool {
+        if self.creases.is_empty() {
+            return true;
+        }
+        let is_curve = |e: EdgeId| self.is_crease(e) || self.mesh.mate(e).is_none();
+        let mut star = self.mesh.edge_star(e).into_iter();
+        !star.any(|d| is_curve(self.mesh.next(d)) && is_curve(self.mesh.prev(d)))
+    }
+
+    /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried.
+    pub fn collapse(&mut self, e: EdgeId, position: Vec3) -> Merged {
+        let from = self
+            .mesh
+            .edge_vertices(e)
+            .map(|v| self.geometry.position(v));
+        let deviation = self.deviation_after(e, position) as f32;
+        let beside = |d: EdgeId| [self.mesh.next(d), self.mesh.prev(d)];
+        let has_crease = |d: &EdgeId| beside(*d).into_iter().any(|e| self.is_crease(e));
+        let star = self.mesh.edge_star(e);
+        let creased: SmallVec<[FaceId; 2]> = star
+            .into_iter()
+            .filter(has_crease)
+            .map(EdgeId::face)
+            .collect();
+        let collapse = self.mesh.collapse(e);
+        self.geometry.set_position(collapse.kept, position);
+        if self.is_locked(collapse.removed) {
+            self.lock(collapse.kept);
+        }
+        if !self.weights.is_empty() {
+            let of_removed = self.weights[collapse.removed.index()];
+            let of_kept = &mut self.weights[collapse.kept.index()];
+            *of_kept = of_kept.max(of_removed);
+        }
+        if !creased.is_empty() {
+            for (f, &merged) in collapse.dead_faces.iter().zip(&collapse.merged_edges) {
+                if creased.contains(f) {
+                    for d in self.mesh.edge_star(merged) {
+                        self.creases[d.index()] = true;
+                    }
+                }
+            }
+        }
+        self.deviation[collapse.kept.index()] = deviation;
+        Merged { collapse, from }
+    }
+
+    /// Flips `e`, with the creases around it.
+    pub fn flip(&mut self, e: EdgeId) {
+        let sides = self.mesh.flip(e);
+        if !self.creases.is_empty() {
+            let creased = sides.map(|(old, _)| self.creases[old.index()]);
+            for ((_, new), creased) in sides.into_iter().zip(creased) {
+                self.creases[new.index()] = creased;
+            }
+        }
+    }
+
+    /// The deviation that the merged vertex would have: a memoryless cost forgets, so each vertex
+    /// carries the sum of what its collapses moved away from the planes at hand.
+    pub fn deviation_after(&self, e: EdgeId, position: Vec3) -> f64 {
+        let [v, w] = self
+            .mesh
+            .edge_vertices(e)
+            .map(|v| self.deviation[v.index()]);
+        f64::from(v.max(w)) + rules::distance_from_star(&self.mesh, &self.geometry, e, position)
+    }
+
+    /// The largest estimated distance of a live vertex from the original, in the unit box.
+    pub fn max_deviation(&self) -> f64 {
+        let deviations = self.mesh.vertices().map(|v| self.deviation[v.index()]);
+        f64::from(deviations.fold(0.0, f32::max))
+    }
+
+    /// The bytes of connectivity and positions.
+    pub fn mesh_bytes(&self) -> usize {
+        self.mesh.bytes() + self.geometry.bytes()
+    }
+
+    /// The bytes of what is carried along.
+    pub fn carried_bytes(&self) -> usize {
+        self.locked.capacity()
+            + self.double_sided.capacity()
+            + self.creases.capacity()
+            + (self.weights.capacity() + self.deviation.capacity()) * size_of::<f32>()
+    }
+}
