@@ -25,6 +25,9 @@ pub struct Stop {
 /// The faces whose edges are evaluated at a time, in parallel.
 const BLOCK_FACES: usize = 1 << 16;
 
+/// A candidate that costs this many times what it did waits for its new turn.
+const RISE: f32 = 1.02;
+
 /// Why a candidate cannot be collapsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Rejection {
@@ -102,6 +105,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<(StopReason, Option<Blocked>)> {
         self.max_error = stop.max_error;
+        let exact_below = self.cost.exact_below();
         let mut changed = Vec::new();
         self.note_bytes();
         while self.triangles > stop.triangles {
@@ -115,9 +119,13 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 continue;
             }
             let e = candidate.edge;
-            let Some(Evaluation { position, .. }) = self.evaluate(e) else {
+            let Some(Evaluation { cost, position }) = self.evaluate(e) else {
                 continue;
             };
+            if cost as f32 > candidate.cost * RISE {
+                self.queue.push(self.candidate_at(e, cost));
+                continue;
+            }
             match self.rejection(e, position) {
                 Some(Rejection::Link) => self.tally.rejected_link += 1,
                 Some(Rejection::Flip) => self.tally.rejected_flip += 1,
@@ -131,7 +139,13 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                     }
                     self.cost
                         .after_collapse(self.surface, &merged, &mut changed);
-                    self.reconsider(&changed);
+                    let faces = self.surface.mesh.face_count();
+                    let faces_before = faces + merged.collapse.dead_faces.len();
+                    if faces < exact_below && faces_before >= exact_below {
+                        self.queue = Q::from_candidates(self.candidates(|_| true));
+                    } else {
+                        self.reconsider(&changed);
+                    }
                     if self.tally.collapses.is_multiple_of(1024)
                         && progress(self.triangles).is_break()
                     {
@@ -143,7 +157,6 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         Ok((StopReason::Target, None))
     }
 
-
     /// What was counted so far.
     pub fn tally(&self) -> Tally {
         self.tally
@@ -154,12 +167,15 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     }
 
     fn candidate(&self, edge: EdgeId) -> Option<Candidate> {
-        let cost = self.evaluate(edge)?.cost as f32;
-        Some(Candidate {
-            cost,
+        Some(self.candidate_at(edge, self.evaluate(edge)?.cost))
+    }
+
+    fn candidate_at(&self, edge: EdgeId, cost: f64) -> Candidate {
+        Candidate {
+            cost: cost as f32,
             edge,
             evaluated_at: self.tally.collapses as u32,
-        })
+        }
     }
 
     /// Whether nothing around the edge has changed since it was evaluated.

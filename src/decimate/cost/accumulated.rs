@@ -26,7 +26,7 @@ impl Quadric {
 
     /// A, b and c as seen from a point at `d` from the vertex.
     #[inline(always)]
-    fn from_point(&self, d: DVec3) -> (Symmetric, DVec3, f64) {
+    fn seen_from(&self, d: DVec3) -> (Symmetric, DVec3, f64) {
         let a = Symmetric::from_single(self.a);
         let along = a.times(d);
         let b = self.b() - along;
@@ -100,8 +100,8 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         let [v, w] = ends;
         let half = surface.geometry.between(w, v) * 0.5;
         // From the middle, which lies at −h from the tail and at h from the head.
-        let (a_v, b_v, c_v) = self.quadrics[v.index()].from_point(-half);
-        let (a_w, b_w, c_w) = self.quadrics[w.index()].from_point(half);
+        let (a_v, b_v, c_v) = self.quadrics[v.index()].seen_from(-half);
+        let (a_w, b_w, c_w) = self.quadrics[w.index()].seen_from(half);
         let form = Form {
             m: a_v.plus(a_w),
             b: b_v + b_w,
@@ -123,7 +123,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
             .zip(merged.from)
             .map(|(v, from)| {
                 let moved = surface.geometry.vector(from, kept);
-                self.quadrics[v.index()].from_point(moved)
+                self.quadrics[v.index()].seen_from(moved)
             })
             .reduce(|(a, b, c), (a2, b2, c2)| (a.plus(a2), b + b2, c + c2));
         let (a, b, c) = sum.expect("two ends");
@@ -134,6 +134,10 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         };
         changed.clear();
         changed.push(kept);
+    }
+
+    fn exact_below(&self) -> usize {
+        usize::MAX
     }
 
     fn bytes(&self) -> usize {

@@ -34,6 +34,13 @@ struct Tensor {
 }
 
 impl Tensor {
+    /// Whether the planes and lines changed by more than [`CHANGE`].
+    fn differs_from(&self, now: &Self) -> bool {
+        let [xx, xy, xz, yy, yz, zz]: [f32; 6] =
+            std::array::from_fn(|i| (now.quadratic[i] - self.quadratic[i]).abs());
+        let trace = now.quadratic[0] + now.quadratic[3] + now.quadratic[5];
+        xx + yy + zz + 2.0 * (xy + xz + yz) > CHANGE * trace
+    }
     fn area(&self) -> DVec3 {
         Vec3::from(self.area).as_dvec3()
     }
@@ -56,6 +63,16 @@ const BUSY: usize = 24;
 /// A vertex that lags by this many changes (with 192 faces or more) stays where it is when a
 /// collapse takes a neighbour in: moving it would turn faces all around it.
 const HEAVY: u16 = 8;
+
+/// A vertex around which a collapse changes less than this share of the tensor does not have its
+/// edges evaluated at once: one that costs more now says so when it is popped. 0.1 to 0.5 differ by
+/// chance alone (0.5 % of rms and of the Hausdorff distance over 12 meshes at five ratios); 0, which
+/// evaluates all of them, takes 1.6 times as long for 0.2 % of rms.
+const CHANGE: f32 = 0.35;
+
+/// With fewer faces than this all edges are evaluated at once: there it costs nothing, and a few
+/// collapses decide how the result looks.
+const EXACT_BELOW: usize = 8000;
 
 /// The memoryless, volume-constrained cost.
 pub struct Memoryless {
@@ -233,9 +250,21 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             is_first = false;
             !waits
         });
-        for &x in &changed[1..] {
-            self.refresh(surface, x);
-        }
+        let is_exact = surface.mesh.face_count() < EXACT_BELOW;
+        is_first = true;
+        changed.retain(|&x| {
+            let before = self.tensors[x.index()];
+            if !is_first {
+                self.refresh(surface, x);
+            }
+            let changed = is_exact || is_first || before.differs_from(&self.tensors[x.index()]);
+            is_first = false;
+            changed
+        });
+    }
+
+    fn exact_below(&self) -> usize {
+        EXACT_BELOW
     }
 
     fn bytes(&self) -> usize {

@@ -39,6 +39,10 @@ pub trait Cost<S: EdgeStore>: Sync {
         changed: &mut Vec<VertexId>,
     );
 
+    /// Below so many faces `after_collapse` lists every vertex whose edges cost something else;
+    /// above, it may leave out where that is little.
+    fn exact_below(&self) -> usize;
+
     /// The bytes that the state holds.
     fn bytes(&self) -> usize;
 }
