@@ -26,6 +26,10 @@ const ALLOWED: f64 = 8.0;
 /// along the surface, which costs 1.5 % of rms and on a sphere 10 %; with 1e-4 slivers appear.
 const RIDGE: f64 = 3e-4;
 
+/// A step goes this much farther than its neighbours' staying where they are would ask for
+/// (successive over-relaxation, Young 1954). On a sphere 1.4 % of rms, elsewhere 0.3 %.
+const RELAXATION: f64 = 1.3;
+
 /// A vertex tries the whole step and its halves, so many times.
 const TRIALS: usize = 3;
 
@@ -241,20 +245,16 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         )
     }
 
-    /// Finds the nearest face of every sample anew: steps look at the faces around only.
-    pub fn reassign(&mut self) {
-        self.lists = assign(self.surface, self.original);
+    /// Moves each vertex once, if there is a better place for it.
+    pub fn move_vertices(&mut self) {
+        for v in 0..self.surface.mesh.vertex_slots() {
+            self.move_vertex(VertexId::new(v));
+        }
     }
 
-    /// Moves each vertex once, if there is a better place for it. Returns how many moved.
-    pub fn move_vertices(&mut self) -> usize {
-        let vertices = (0..self.surface.mesh.vertex_slots()).map(VertexId::new);
-        vertices.filter(|&v| self.move_vertex(v)).count()
-    }
-
-    fn move_vertex(&mut self, v: VertexId) -> bool {
+    fn move_vertex(&mut self, v: VertexId) {
         if self.is_settled[v.index()] || self.surface.is_locked(v) {
-            return false;
+            return;
         }
         let mut star = std::mem::take(&mut self.star);
         let step = if self.look_around(v, &mut star) {
@@ -281,7 +281,6 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
             }
         }
         self.star = star;
-        step.is_some()
     }
 
     /// Collects what lies around `v`; whether it may move at all.
@@ -377,7 +376,7 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         if before.largest <= self.original.noise_squared {
             return None;
         }
-        let mut step = system.solve()?;
+        let mut step = system.solve()? * RELAXATION;
         for _ in 0..TRIALS {
             let position = (here + step).as_vec3();
             step *= 0.5;
@@ -417,31 +416,26 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         None
     }
 
-    /// Flips each edge once, if the other diagonal is nearer to the original. Returns how many
-    /// were flipped.
-    pub fn flip_edges(&mut self) -> usize {
-        let mut flips = 0;
+    /// Flips each edge once, if the other diagonal is nearer to the original.
+    pub fn flip_edges(&mut self) {
         for f in (0..self.surface.mesh.face_slots()).map(FaceId::new) {
             if !self.surface.mesh.is_live_face(f) {
                 continue;
             }
             for e in f.edges() {
-                let is_first = self.surface.mesh.mate(e).is_some_and(|o| e < o);
-                flips += usize::from(is_first && self.flip_edge(e));
+                if let Some(o) = self.surface.mesh.mate(e).filter(|&o| e < o) {
+                    self.flip_edge(e, o);
+                }
             }
         }
-        flips
     }
 
-    fn flip_edge(&mut self, e: EdgeId) -> bool {
+    fn flip_edge(&mut self, e: EdgeId, o: EdgeId) {
         let mesh = &self.surface.mesh;
-        let Opposite::Edge(o) = mesh.opposite(e) else {
-            return false;
-        };
         let faces = [e.face(), o.face()];
         let is_alike = self.surface.sides(faces[0]) == self.surface.sides(faces[1]);
         if !is_alike || self.surface.is_crease(e) {
-            return false;
+            return;
         }
         let ends = mesh.edge_vertices(e);
         let apexes = [mesh.apex(e), mesh.apex(o)];
@@ -449,7 +443,7 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         let ([a, b], [c, d]) = (ends.map(at), apexes.map(at));
         let (old, new) = ([[a, b, c], [b, a, d]], [[d, c, a], [c, d, b]]);
         if !may_flip(&old, &new) {
-            return false;
+            return;
         }
         let mut items = std::mem::take(&mut self.star.items);
         items.clear();
@@ -488,7 +482,6 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
             }
         }
         self.star.items = items;
-        is_better
     }
 
     /// Whether a flip is better also with the way to the original, which it then notes.

@@ -241,8 +241,8 @@ impl Job<'_> {
         Ok(stopped)
     }
 
-    /// Collapses and fits in turns: a vertex that has been fitted gives the planes around it back
-    /// something of the original, of which the cost remembers nothing.
+    /// Collapses, and fits what is left to the original. Where an error stopped it, goes on with
+    /// what was measured in the place of what was estimated.
     fn collapse_and_fit<S: EdgeStore>(
         &mut self,
         surface: &mut Surface<S>,
@@ -253,56 +253,38 @@ impl Job<'_> {
         let original = Original::new(&surface.mesh, surface.geometry.positions(), with_boundary);
         loop {
             let triangles = surface.triangles();
-            let half = triangles / 2;
-            let stage = if (half as f64) < LAST_STAGE * stop.triangles as f64 {
-                stop.triangles
-            } else {
-                half
-            };
-            let stage_stop = Stop {
-                triangles: stage,
-                ..stop
-            };
-            let stopped = self.collapse(surface, stage_stop, |surface| {
+            let stopped = self.collapse(surface, stop, |surface| {
                 Memoryless::new(surface, options.boundary, options.placement)
             })?;
             if stopped.0 == StopReason::Cancelled {
                 return Ok(stopped);
             }
-            let is_last = surface.triangles() <= stop.triangles
-                || surface.triangles() as f64 > STUCK * triangles as f64;
             let mut fit = Fit::new(surface, &original, options.targets.max_error);
             self.tally.working_bytes = self.tally.working_bytes.max(original.bytes() + fit.bytes());
-            for round in 0..if is_last { ROUNDS } else { 1 } {
-                if round > 0 {
-                    fit.reassign();
-                }
-                if is_last {
-                    fit.flip_edges();
-                }
-                for _ in 0..if is_last { SWEEPS } else { 1 } {
-                    fit.move_vertices();
-                }
+            fit.flip_edges();
+            if options.placement == Placement::Optimal {
+                (0..SWEEPS).for_each(|_| fit.move_vertices());
             }
             fit.finish();
-            if is_last {
+            if options.check {
+                let wrong = |wrong| Error::Internal(format!("after fitting: {wrong}"));
+                surface.mesh.check().map_err(wrong)?;
+            }
+            let is_stuck = surface.triangles() as f64 > STUCK * triangles as f64;
+            if stopped.0 != StopReason::MaxError || is_stuck {
                 return Ok(stopped);
             }
         }
     }
 }
 
-/// The last stage begins where this many times the target would be left.
-const LAST_STAGE: f64 = 1.3;
+/// Sweeps over the vertices: the second saves 2 % of rms, the third 0.6 %. Fitting after each
+/// halving of the triangles as well saves 0.9 % and takes 40 % longer; a second round of flips and
+/// sweeps, with the samples' nearest faces found anew, saves 1.2 % and takes 60 % longer.
+const SWEEPS: usize = 3;
 
-/// A stage that leaves more than this of the triangles was the last.
-const STUCK: f64 = 0.95;
-
-/// Rounds of flips and sweeps at the end. One costs 1.3 % of rms, six save 0.4 %.
-const ROUNDS: usize = 3;
-
-/// Sweeps over the vertices in a round.
-const SWEEPS: usize = 2;
+/// Where a turn leaves more than this of the triangles, another is not worth its time.
+const STUCK: f64 = 0.98;
 
 #[cfg(test)]
 mod tests;

@@ -57,6 +57,17 @@ impl Unit {
         }
     }
 
+    /// The single-precision box around where this point is.
+    #[inline]
+    fn around(&self, p: DVec3) -> Bounds {
+        let at = ((p - self.center) * self.scale).as_vec3();
+        let error = at.abs() * f32::EPSILON + Vec3::splat(self.error as f32);
+        Bounds {
+            min: at - error,
+            max: at + error,
+        }
+    }
+
     /// The single-precision box around where these points are.
     fn bounds(&self, points: &[DVec3]) -> Bounds {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -253,7 +264,7 @@ impl Triangles {
         if self.is_empty() {
             return None;
         }
-        let around_p = self.unit.bounds(&[p]);
+        let around_p = self.unit.around(p);
         let mut best = Nearest::none();
         if let Some(slot) = guess {
             self.try_slot(p, slot, &mut best);
