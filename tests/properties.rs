@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use decimate::clean::clean;
 use decimate::decimate::{
-    Boundary, Options, Placement, Report, StopReason, Targets, TierChoice, decimate,
+    Boundary, Options, Placement, Quality, Report, StopReason, Targets, TierChoice, decimate,
 };
 use decimate::error::Error;
 use decimate::indexed_mesh::IndexedMesh;
@@ -270,6 +270,8 @@ fn options(random: &mut Random) -> Options {
         targets,
         boundary: random.pick(&[Boundary::Keep, Boundary::Lock, Boundary::Free]),
         placement: random.pick(&[Placement::Optimal, Placement::Endpoint]),
+        quality: random.pick(&[Quality::Fast, Quality::Standard, Quality::Best]),
+        feature_angle_degrees: random.pick(&[None, None, Some(30.0)]),
         weld: !random.one_in(3),
         check: true,
         ..Options::default()

@@ -256,7 +256,8 @@ impl Job<'_> {
             let stopped = self.collapse(surface, stop, |surface| {
                 Memoryless::new(surface, options.boundary, options.placement)
             })?;
-            if stopped.0 == StopReason::Cancelled {
+            let is_untouched = surface.triangles() == triangles;
+            if stopped.0 == StopReason::Cancelled || is_untouched {
                 return Ok(stopped);
             }
             let mut fit = Fit::new(surface, &original, options.targets.max_error);
