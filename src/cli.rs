@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use decimate::decimate::{Boundary, Options, Placement, Quality, Targets, TierChoice};
+use decimate::decimate::{Boundary, Options, Placement, Quality, Targets, TierChoice, Topology};
 use decimate::io::Format;
 use decimate::mesh::Tier;
 
@@ -131,6 +131,9 @@ pub struct Run {
     /// What may happen to boundaries.
     #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
     pub boundary: BoundaryArg,
+    /// What may happen to the topology.
+    #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
+    pub topology: TopologyArg,
     /// Where merged vertices go.
     #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
     pub placement: PlacementArg,
@@ -201,6 +204,16 @@ pub enum BoundaryArg {
     Free,
 }
 
+/// `--topology`.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum TopologyArg {
+    /// Keep components, boundary loops and handles
+    #[default]
+    Preserve,
+    /// Let tiny components vanish, pockets fall flat, gaps and holes close, cheapest first
+    Simplify,
+}
+
 /// `--placement`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub enum PlacementArg {
@@ -244,6 +257,10 @@ impl Run {
                 BoundaryArg::Keep => Boundary::Keep,
                 BoundaryArg::Lock => Boundary::Lock,
                 BoundaryArg::Free => Boundary::Free,
+            },
+            topology: match self.topology {
+                TopologyArg::Preserve => Topology::Preserve,
+                TopologyArg::Simplify => Topology::Simplify,
             },
             placement: match self.placement {
                 PlacementArg::Optimal => Placement::Optimal,

@@ -12,7 +12,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::original::Original;
+use super::original::{Original, centroids};
 use super::surface::Surface;
 use crate::mesh::{EdgeId, EdgeStore, FaceId, Opposite, Outgoing, VertexId};
 use crate::nearest::{Foot, Triangles, foot_on_triangle};
@@ -94,6 +94,14 @@ impl ToOriginal {
     }
 }
 
+/// The squared distances of a face's inner points to the original: their mean and the largest.
+#[derive(Clone, Copy, Debug, Default)]
+struct FaceToOriginal {
+    mean: f64,
+    largest: f64,
+    slot: Option<u32>,
+}
+
 /// The samples on each face, as lists that share one array.
 struct Lists {
     first: Vec<Option<Sample>>,
@@ -149,8 +157,8 @@ struct Star {
     curve_items: Vec<Item>,
     /// Where each item is nearest after the step.
     landed: Vec<usize>,
-    /// To the original after the step: of each face's centroid.
-    centroids: Vec<ToOriginal>,
+    /// To the original after the step, face by face.
+    to_original: Vec<FaceToOriginal>,
 }
 
 /// A surface being fitted.
@@ -158,7 +166,9 @@ pub struct Fit<'a, S> {
     surface: &'a mut Surface<S>,
     original: &'a Original,
     lists: Lists,
-    centroids: Vec<ToOriginal>,
+    /// Each face is measured in the centroids of the triangles that so many rows cut it into.
+    rows: usize,
+    to_original: Vec<FaceToOriginal>,
     corners: Vec<ToOriginal>,
     /// The vertices that have found no step since their surroundings changed.
     is_settled: Vec<bool>,
@@ -177,7 +187,8 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
     ) -> Self {
         let mut fit = Self {
             lists: assign(surface, original),
-            centroids: Vec::new(),
+            rows: rows(surface.mesh.face_count()),
+            to_original: Vec::new(),
             corners: Vec::new(),
             is_settled: vec![false; surface.mesh.vertex_slots()],
             allowed: 0.0,
@@ -197,14 +208,14 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         let (mesh, geometry) = (&self.surface.mesh, &self.surface.geometry);
         let to = |point| ToOriginal::of(point, &self.original.faces, None);
         let at = |v: VertexId| geometry.position(v).as_dvec3();
-        self.centroids = (0..mesh.face_slots())
+        self.to_original = (0..mesh.face_slots())
             .into_par_iter()
             .map(FaceId::new)
             .map(|f| {
                 if mesh.is_live_face(f) {
-                    to(mesh.face_vertices(f).map(at).iter().sum::<DVec3>() / 3.0)
+                    self.face_to_original(&self.triangle(f), None)
                 } else {
-                    ToOriginal::default()
+                    FaceToOriginal::default()
                 }
             })
             .collect();
@@ -216,6 +227,31 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
                 _ => to(at(v)),
             })
             .collect();
+    }
+
+    fn face_to_original(&self, triangle: &[DVec3; 3], guess: Option<u32>) -> FaceToOriginal {
+        let mut face = FaceToOriginal {
+            slot: guess,
+            ..FaceToOriginal::default()
+        };
+        for point in centroids(triangle, self.rows) {
+            let there = ToOriginal::of(point, &self.original.faces, face.slot);
+            face.slot = there.slot;
+            face.mean += there.squared;
+            face.largest = face.largest.max(there.squared);
+        }
+        face.mean /= (self.rows * self.rows) as f64;
+        face
+    }
+
+    /// Adds the way from a face to the original: inner points and one corner, which stands for all
+    /// that it is a corner of.
+    #[inline(always)]
+    fn add_face(&self, measure: &mut Measure, area: f64, face: FaceToOriginal, corner: f64) {
+        let at_corner = area / (12 * self.rows) as f64;
+        measure.add(face.mean, area - 3.0 * at_corner);
+        measure.largest = measure.largest.max(face.largest);
+        measure.add(corner, at_corner);
     }
 
     /// The weighted mean of the squared distances, both ways.
@@ -234,7 +270,7 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
                 weights += weight;
             }
             let weight = area(&triangle);
-            sum += weight * self.centroids[f.index()].squared;
+            sum += weight * self.to_original[f.index()].mean;
             weights += weight;
         }
         sum / weights
@@ -273,8 +309,8 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         if let Some((position, corner)) = step {
             self.surface.geometry.set_position(v, position);
             self.corners[v.index()] = corner;
-            for (&f, &centroid) in star.faces.iter().zip(&star.centroids) {
-                self.centroids[f.index()] = centroid;
+            for (&f, &to_original) in star.faces.iter().zip(&star.to_original) {
+                self.to_original[f.index()] = to_original;
                 self.lists.clear(f);
             }
             for (item, &face) in star.items.iter().zip(&star.landed).rev() {
@@ -377,8 +413,12 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         }
         for (&f, &[a, b]) in star.faces.iter().zip(&star.rim) {
             let area = area(&[here, a, b]);
-            before.add(self.centroids[f.index()].squared, 0.75 * area);
-            before.add(corner.squared, area / 12.0);
+            self.add_face(
+                &mut before,
+                area,
+                self.to_original[f.index()],
+                corner.squared,
+            );
         }
         if before.largest <= self.original.noise_squared {
             return None;
@@ -407,14 +447,13 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
                 continue;
             }
             let corner = ToOriginal::of(there, &self.original.faces, corner.slot);
-            star.centroids.clear();
+            star.to_original.clear();
             for (&f, &[a, b]) in star.faces.iter().zip(&star.rim) {
-                let guess = self.centroids[f.index()].slot;
-                let centroid = ToOriginal::of((there + a + b) / 3.0, &self.original.faces, guess);
-                let area = area(&[there, a, b]);
-                after.add(centroid.squared, 0.75 * area);
-                after.add(corner.squared, area / 12.0);
-                star.centroids.push(centroid);
+                let triangle = [there, a, b];
+                let guess = self.to_original[f.index()].slot;
+                let face = self.face_to_original(&triangle, guess);
+                self.add_face(&mut after, area(&triangle), face, corner.squared);
+                star.to_original.push(face);
             }
             if after.is_better(&before, GAIN, self.allowed) {
                 return Some((position, corner));
@@ -501,18 +540,17 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         mut before: Measure,
         mut after: Measure,
     ) -> bool {
-        let centroids = [0, 1].map(|k| {
-            let here = self.centroids[faces[k].index()];
-            before.add(here.squared, 0.75 * area(&old[k]));
-            let centroid = new[k].iter().sum::<DVec3>() / 3.0;
-            let there = ToOriginal::of(centroid, &self.original.faces, here.slot);
-            after.add(there.squared, 0.75 * area(&new[k]));
+        let to_original = [0, 1].map(|k| {
+            let here = self.to_original[faces[k].index()];
+            let there = self.face_to_original(&new[k], here.slot);
+            self.add_face(&mut before, area(&old[k]), here, 0.0);
+            self.add_face(&mut after, area(&new[k]), there, 0.0);
             there
         });
         let is_better = after.is_better(&before, gain, self.allowed);
         if is_better {
-            for (f, centroid) in faces.into_iter().zip(centroids) {
-                self.centroids[f.index()] = centroid;
+            for (f, there) in faces.into_iter().zip(to_original) {
+                self.to_original[f.index()] = there;
             }
         }
         is_better
@@ -524,7 +562,7 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
         let mut largest: Vec<f64> = self.corners.iter().map(|c| c.squared).collect();
         for f in mesh.faces() {
             let triangle = self.triangle(f);
-            let mut on_face = self.centroids[f.index()].squared;
+            let mut on_face = self.to_original[f.index()].largest;
             for i in self.lists.on(f) {
                 let (point, _) = self.sample(i);
                 on_face = on_face.max(
@@ -545,9 +583,17 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
     /// The bytes held, without the original.
     pub fn bytes(&self) -> usize {
         (self.lists.first.capacity() + self.lists.next.capacity()) * size_of::<Option<Sample>>()
-            + (self.centroids.capacity() + self.corners.capacity()) * size_of::<ToOriginal>()
+            + self.to_original.capacity() * size_of::<FaceToOriginal>()
+            + self.corners.capacity() * size_of::<ToOriginal>()
             + self.is_settled.capacity()
     }
+}
+
+/// The rows that so many faces are measured in: one, more where a few faces span the original.
+fn rows(faces: usize) -> usize {
+    const POINTS: f64 = 10_000.0;
+    const ROWS: f64 = 8.0;
+    (POINTS / faces.max(1) as f64).sqrt().clamp(1.0, ROWS) as usize
 }
 
 /// The list of each face's samples: those that are nearest to it.
@@ -596,7 +642,10 @@ fn assign<S: EdgeStore>(surface: &Surface<S>, original: &Original) -> Lists {
                 } else {
                     let nearest = curves.nearest_from(point.as_dvec3(), curve_guess)?;
                     curve_guess = Some(nearest.slot);
-                    Some(edges[nearest.triangle as usize].face())
+                    let [a, b, _] = curves.corners()[nearest.slot as usize];
+                    // A boundary that is gone must not pull at another.
+                    let is_near = nearest.distance_squared <= a.distance_squared(b);
+                    is_near.then(|| edges[nearest.triangle as usize].face())
                 }
             })
         })

@@ -6,12 +6,13 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::cost::{Cost, Evaluation};
+use super::options::Topology;
 use super::queue::{Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
 use super::rules;
 use super::surface::{Merged, Surface};
 use crate::error::{Error, Result};
-use crate::mesh::{EdgeId, EdgeStore, FaceId, VertexId};
+use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, VertexId};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +38,22 @@ enum Rejection {
     Error,
 }
 
+/// How a candidate is collapsed.
+enum Way {
+    Collapse,
+    Contract(Contraction),
+}
+
+/// A part of the surface that hangs together with nothing else.
+struct Component {
+    /// What it costs to remove it.
+    price: f32,
+    /// Its diagonal, in the unit box.
+    diagonal: f64,
+    /// Its faces at the start.
+    faces: Vec<FaceId>,
+}
+
 /// A surface being decimated under one cost.
 pub struct Greedy<'a, S, C, Q> {
     surface: &'a mut Surface<S>,
@@ -47,23 +64,34 @@ pub struct Greedy<'a, S, C, Q> {
     /// The edges to evaluate after a collapse; kept for its memory.
     edges: Vec<EdgeId>,
     triangles: usize,
-    max_error: Option<f64>,
+    stop: Stop,
+    topology: Topology,
+    /// What may be removed, the cheapest last; nothing where the topology stays.
+    components: Vec<Component>,
     tally: Tally,
 }
 
 impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     /// Evaluates every edge, in parallel. Counting goes on from `tally`.
-    pub fn new(surface: &'a mut Surface<S>, cost: C, tally: Tally) -> Self {
+    pub fn new(surface: &'a mut Surface<S>, cost: C, topology: Topology, tally: Tally) -> Self {
         let slots = surface.mesh.vertex_slots();
         let triangles = surface.triangles();
         let mut greedy = Self {
-            surface,
             cost,
             queue: Q::from_candidates(Vec::new()),
             changed_at: vec![0; slots],
             edges: Vec::new(),
             triangles,
-            max_error: None,
+            stop: Stop {
+                triangles: 0,
+                max_error: None,
+            },
+            topology,
+            components: match topology {
+                Topology::Preserve => Vec::new(),
+                Topology::Simplify => removable(surface),
+            },
+            surface,
             tally,
         };
         greedy.tally.rejected_lock = greedy.locked_edges();
@@ -105,7 +133,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         check: bool,
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<(StopReason, Option<Blocked>)> {
-        self.max_error = stop.max_error;
+        self.stop = stop;
         let exact_below = self.cost.exact_below();
         let mut changed = Vec::new();
         self.note_bytes();
@@ -114,9 +142,22 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 if self.revive() {
                     continue;
                 }
+                if !self.components.is_empty() {
+                    self.remove_component();
+                    continue;
+                }
                 return Ok(self.blocked());
             };
             if !self.is_fresh(&candidate) {
+                continue;
+            }
+            if self
+                .components
+                .last()
+                .is_some_and(|c| c.price < candidate.cost)
+            {
+                self.queue.push(candidate);
+                self.remove_component();
                 continue;
             }
             let e = candidate.edge;
@@ -127,12 +168,12 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 self.queue.push(self.candidate_at(e, cost));
                 continue;
             }
-            match self.rejection(e, position) {
-                Some(Rejection::Link) => self.tally.rejected_link += 1,
-                Some(Rejection::Flip) => self.tally.rejected_flip += 1,
-                Some(Rejection::Error) => self.tally.rejected_error += 1,
-                None => {
-                    let merged = self.collapse(e, position);
+            match self.way(e, position) {
+                Err(Rejection::Link) => self.tally.rejected_link += 1,
+                Err(Rejection::Flip) => self.tally.rejected_flip += 1,
+                Err(Rejection::Error) => self.tally.rejected_error += 1,
+                Ok(way) => {
+                    let merged = self.collapse(e, position, &way);
                     if check {
                         self.surface.mesh.check().map_err(|wrong| {
                             Error::Internal(format!("after {:?}: {wrong}", merged.collapse))
@@ -192,22 +233,67 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 .all(unchanged)
     }
 
-    fn rejection(&self, e: EdgeId, position: Vec3) -> Option<Rejection> {
-        if !self.surface.mesh.link_condition(e) || !self.surface.crease_condition(e) {
-            Some(Rejection::Link)
-        } else if rules::turns_a_face(&self.surface.mesh, &self.surface.geometry, e, position) {
-            Some(Rejection::Flip)
+    /// How `e` can be collapsed to `position`, or why it cannot.
+    fn way(&self, e: EdgeId, position: Vec3) -> std::result::Result<Way, Rejection> {
+        let mesh = &self.surface.mesh;
+        let way = if mesh.link_condition(e) && self.surface.crease_condition(e) {
+            Way::Collapse
+        } else {
+            Way::Contract(self.contraction(e).ok_or(Rejection::Link)?)
+        };
+        if rules::turns_a_face(mesh, &self.surface.geometry, e, position) {
+            Err(Rejection::Flip)
         } else if self
+            .stop
             .max_error
             .is_some_and(|limit| self.surface.deviation_after(e, position) > limit)
         {
-            Some(Rejection::Error)
+            Err(Rejection::Error)
         } else {
-            None
+            Ok(way)
         }
     }
 
-    fn collapse(&mut self, e: EdgeId, position: Vec3) -> Merged {
+    /// The contraction of `e`, where the topology may change and there are no creases to keep; none
+    /// that would overshoot the target or leave nothing.
+    fn contraction(&self, e: EdgeId) -> Option<Contraction> {
+        if self.topology == Topology::Preserve || !self.surface.creases.is_empty() {
+            return None;
+        }
+        let contraction = self.surface.mesh.contraction(e)?;
+        let dead = contraction.dead_faces().iter();
+        let dead: usize = dead.map(|&f| self.surface.sides(f)).sum();
+        let overshoots = self.triangles + 1 < self.stop.triangles + dead;
+        (!overshoots && dead < self.triangles).then_some(contraction)
+    }
+
+    /// Removes the cheapest component, unless that would overshoot the target or the error.
+    fn remove_component(&mut self) {
+        let Some(component) = self.components.pop() else {
+            return;
+        };
+        let mut faces = component.faces;
+        faces.retain(|&f| self.surface.mesh.is_live_face(f));
+        let triangles: usize = faces.iter().map(|&f| self.surface.sides(f)).sum();
+        let limit = self.stop.max_error.unwrap_or(f64::INFINITY);
+        let has_locked = |f: &FaceId| {
+            let vertices = self.surface.mesh.face_vertices(*f);
+            vertices.into_iter().any(|v| self.surface.is_locked(v))
+        };
+        let is_allowed = !faces.is_empty()
+            && triangles < self.triangles
+            && self.triangles + 1 >= self.stop.triangles + triangles
+            && component.diagonal <= limit
+            && !faces.iter().any(has_locked);
+        if is_allowed {
+            self.surface.mesh.remove_component(&faces);
+            self.surface.lost = self.surface.lost.max(component.diagonal);
+            self.triangles -= triangles;
+            self.tally.removed_components += 1;
+        }
+    }
+
+    fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way) -> Merged {
         let mesh = &self.surface.mesh;
         let ends = mesh.edge_vertices(e);
         let star = mesh.edge_star(e);
@@ -216,7 +302,12 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         if touched.any(|v| mesh.is_non_manifold_vertex(v)) {
             self.tally.collapses_non_manifold += 1;
         }
-        let merged = self.surface.collapse(e, position);
+        let contraction = match way {
+            Way::Collapse => None,
+            Way::Contract(contraction) => Some(contraction),
+        };
+        self.tally.contractions += usize::from(contraction.is_some());
+        let merged = self.surface.collapse(e, position, contraction);
         let dead = merged.collapse.dead_faces.iter();
         self.triangles -= dead.map(|&f| self.surface.sides(f)).sum::<usize>();
         self.tally.collapses += 1;
@@ -272,7 +363,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     fn revive(&mut self) -> bool {
         let can_collapse = |c: &Candidate| {
             self.evaluate(c.edge)
-                .is_some_and(|e| self.rejection(c.edge, e.position).is_none())
+                .is_some_and(|e| self.way(c.edge, e.position).is_ok())
         };
         self.queue = Q::from_candidates(self.candidates(can_collapse));
         self.queue.len() > 0
@@ -288,11 +379,11 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             let Some(Evaluation { position, .. }) = self.evaluate(e) else {
                 continue;
             };
-            match self.rejection(e, position) {
-                Some(Rejection::Link) => blocked.link += 1,
-                Some(Rejection::Flip) => blocked.flip += 1,
-                Some(Rejection::Error) => blocked.error += 1,
-                None => debug_assert!(false, "{e:?} was left although it could be collapsed"),
+            match self.way(e, position) {
+                Err(Rejection::Link) => blocked.link += 1,
+                Err(Rejection::Flip) => blocked.flip += 1,
+                Err(Rejection::Error) => blocked.error += 1,
+                Ok(_) => debug_assert!(false, "{e:?} was left although it could be collapsed"),
             }
         }
         let reason = if blocked.error > 0 {
@@ -320,4 +411,31 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             + self.changed_at.capacity() * size_of::<u32>();
         self.tally.working_bytes = self.tally.working_bytes.max(bytes);
     }
+}
+
+/// The components of a surface by what removing them costs, the cheapest last and the dearest, which
+/// stays, left out: area times squared diagonal, as if all of it went that far.
+fn removable<S: EdgeStore>(surface: &Surface<S>) -> Vec<Component> {
+    let mut components: Vec<Component> = surface
+        .mesh
+        .components()
+        .into_iter()
+        .map(|faces| {
+            let (area, diagonal) = surface.extent(&faces);
+            Component {
+                price: (area * diagonal * diagonal) as f32,
+                diagonal,
+                faces,
+            }
+        })
+        .collect();
+    components.sort_by(|a, b| {
+        b.price
+            .total_cmp(&a.price)
+            .then(a.faces[0].cmp(&b.faces[0]))
+    });
+    if !components.is_empty() {
+        components.remove(0);
+    }
+    components
 }

@@ -21,7 +21,7 @@ use crate::indexed_mesh::IndexedMesh;
 use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
-pub use options::{Boundary, Options, Placement, Quality, Targets, TierChoice};
+pub use options::{Boundary, Options, Placement, Quality, Targets, TierChoice, Topology};
 pub use report::{Blocked, Report, StopReason, Tally};
 
 use cost::{Accumulated, Cost, Memoryless};
@@ -140,6 +140,7 @@ fn run<S: EdgeStore>(
         creases: Vec::new(),
         weights: Vec::new(),
         deviation: vec![0.0; mesh.vertex_slots()],
+        lost: 0.0,
         geometry: Geometry::new(positions, diagonal),
         mesh,
         double_sided,
@@ -235,7 +236,8 @@ impl Job<'_> {
         cost: impl FnOnce(&Surface<S>) -> C,
     ) -> Result<Stopped> {
         let cost = cost(surface);
-        let mut greedy = Greedy::<_, _, LazyHeap>::new(surface, cost, self.tally);
+        let mut greedy =
+            Greedy::<_, _, LazyHeap>::new(surface, cost, self.options.topology, self.tally);
         let stopped = greedy.run(stop, self.options.check, self.progress)?;
         self.tally = greedy.tally();
         Ok(stopped)

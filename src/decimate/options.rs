@@ -41,6 +41,18 @@ pub enum Boundary {
     Free,
 }
 
+/// What may happen to the topology.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Topology {
+    /// It stays: components, boundary loops, handles, non-manifold curves, enclosed pockets.
+    #[default]
+    Preserve,
+    /// Components may vanish, pockets fall flat, gaps and holes close: each for what it costs in area
+    /// and distance, the cheapest first. Nothing tears and nothing non-manifold is born.
+    Simplify,
+}
+
 /// Where the vertex that is left of an edge goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -71,6 +83,8 @@ pub struct Options {
     pub quality: Quality,
     /// What may happen to the boundary.
     pub boundary: Boundary,
+    /// What may happen to the topology.
+    pub topology: Topology,
     /// Where merged vertices go.
     pub placement: Placement,
     /// Edges at which the surface turns by more than this are kept as curves; none where not given.
@@ -92,6 +106,7 @@ impl Default for Options {
             targets: Targets::default(),
             quality: Quality::default(),
             boundary: Boundary::default(),
+            topology: Topology::default(),
             placement: Placement::default(),
             feature_angle_degrees: None,
             tier: TierChoice::default(),

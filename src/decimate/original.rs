@@ -96,7 +96,7 @@ impl Original {
 }
 
 /// The centroids of the triangles that so many rows cut one into.
-fn centroids(&[a, b, c]: &[DVec3; 3], rows: usize) -> impl Iterator<Item = DVec3> {
+pub(super) fn centroids(&[a, b, c]: &[DVec3; 3], rows: usize) -> impl Iterator<Item = DVec3> {
     let n = 3.0 * rows as f64;
     let at = move |i: usize, j: usize, third: f64| {
         let (u, v) = ((3 * i) as f64 + third, (3 * j) as f64 + third);

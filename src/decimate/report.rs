@@ -41,6 +41,10 @@ pub struct Tally {
     /// Of these, the ones that touched something non-manifold: a vertex at an end of the edge or
     /// across from it in a dying face.
     pub collapses_non_manifold: usize,
+    /// Collapses, of these, that changed the topology, where that was allowed.
+    pub contractions: usize,
+    /// Components removed, where that was allowed.
+    pub removed_components: usize,
     /// Refusals because the topology would have changed.
     pub rejected_link: usize,
     /// Refusals because a face would have turned.

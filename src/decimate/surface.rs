@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::geometry::Geometry;
 use super::rules;
-use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
+use crate::mesh::{Collapse, Contraction, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 
 /// A collapse, and where its ends were.
 pub struct Merged {
@@ -13,6 +13,8 @@ pub struct Merged {
     pub collapse: Collapse,
     /// The positions before of the vertex that is gone and of the one that is left.
     pub from: [Vec3; 2],
+    /// The vertices around that may have lost faces, too, where it was no mere collapse.
+    pub around: Vec<VertexId>,
 }
 
 /// A mesh being decimated and all that is carried along by its slots.
@@ -31,6 +33,8 @@ pub struct Surface<S> {
     pub weights: Vec<f32>,
     /// An estimate of how far each vertex is from the original, in the unit box.
     pub deviation: Vec<f32>,
+    /// How far what was removed altogether may have been from what is left, in the unit box.
+    pub lost: f64,
 }
 
 impl<S: EdgeStore> Surface<S> {
@@ -138,8 +142,14 @@ impl<S: EdgeStore> Surface<S> {
         !star.any(|d| is_curve(self.mesh.next(d)) && is_curve(self.mesh.prev(d)))
     }
 
-    /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried.
-    pub fn collapse(&mut self, e: EdgeId, position: Vec3) -> Merged {
+    /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried; by a
+    /// contraction, if one is given.
+    pub fn collapse(
+        &mut self,
+        e: EdgeId,
+        position: Vec3,
+        contraction: Option<&Contraction>,
+    ) -> Merged {
         let from = self
             .mesh
             .edge_vertices(e)
@@ -153,7 +163,13 @@ impl<S: EdgeStore> Surface<S> {
             .filter(has_crease)
             .map(EdgeId::face)
             .collect();
-        let collapse = self.mesh.collapse(e);
+        let (collapse, around) = match contraction {
+            None => (self.mesh.collapse(e), Vec::new()),
+            Some(contraction) => (
+                self.mesh.contract(contraction),
+                contraction.around().to_vec(),
+            ),
+        };
         self.geometry.set_position(collapse.kept, position);
         if self.is_locked(collapse.removed) {
             self.lock(collapse.kept);
@@ -173,7 +189,11 @@ impl<S: EdgeStore> Surface<S> {
             }
         }
         self.deviation[collapse.kept.index()] = deviation;
-        Merged { collapse, from }
+        Merged {
+            collapse,
+            from,
+            around,
+        }
     }
 
     /// Flips `e`, with the creases around it.
@@ -197,10 +217,25 @@ impl<S: EdgeStore> Surface<S> {
         f64::from(v.max(w)) + rules::distance_from_star(&self.mesh, &self.geometry, e, position)
     }
 
-    /// The largest estimated distance of a live vertex from the original, in the unit box.
+    /// The largest estimated distance from the original, in the unit box.
     pub fn max_deviation(&self) -> f64 {
         let deviations = self.mesh.vertices().map(|v| self.deviation[v.index()]);
-        f64::from(deviations.fold(0.0, f32::max))
+        f64::from(deviations.fold(0.0, f32::max)).max(self.lost)
+    }
+
+    /// The area of these faces and the diagonal of the box around them, in the unit box.
+    pub fn extent(&self, faces: &[FaceId]) -> (f64, f64) {
+        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let mut area = 0.0;
+        for f in faces {
+            area += self.geometry.normal(&self.mesh, f.edges()[0]).length() / 2.0;
+            for v in self.mesh.face_vertices(*f) {
+                min = min.min(self.geometry.position(v));
+                max = max.max(self.geometry.position(v));
+            }
+        }
+        let diagonal = (max.as_dvec3() - min.as_dvec3()) * self.geometry.scale();
+        (area, diagonal.length())
     }
 
     /// The bytes of connectivity and positions.

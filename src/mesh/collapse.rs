@@ -296,7 +296,7 @@ impl<S: EdgeStore> Mesh<S> {
     }
 
     /// Finds the fans of `v`, whose outgoing edges are these.
-    fn find_fans_among(&mut self, v: VertexId, outgoing: &mut [EdgeId]) {
+    pub(super) fn find_fans_among(&mut self, v: VertexId, outgoing: &mut [EdgeId]) {
         outgoing.sort_unstable();
         let mut seen: SmallVec<[bool; 24]> = SmallVec::from_elem(false, outgoing.len());
         for i in 0..outgoing.len() {

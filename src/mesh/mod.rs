@@ -15,6 +15,7 @@ mod build;
 mod check;
 mod collapse;
 mod compact;
+mod contract;
 mod flip;
 mod ids;
 mod link;
@@ -27,6 +28,7 @@ mod tests;
 
 pub use collapse::Collapse;
 pub use compact::Compaction;
+pub use contract::Contraction;
 pub use ids::{EdgeId, FaceId, VertexId};
 pub use link::{Opposite, Outgoing, RowId};
 pub use orient::{Oriented, turn_round};

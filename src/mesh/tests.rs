@@ -582,7 +582,89 @@ fn flips_keep_tables_and_topology<S: EdgeStore>() {
     assert!(flips > 3000, "{flips}");
 }
 
+/// Contractions of random edges, where the link condition forbids a collapse: every table stays
+/// what a rebuild gives; no edge and no vertex is less manifold than it was, none becomes a boundary.
+fn contractions_make_nothing_worse<S: EdgeStore>() {
+    let mut contractions = 0;
+    for seed in 0..600 {
+        let (vertices, triangles) = if seed % 2 == 0 {
+            random_complex(seed)
+        } else {
+            random_surface(seed)
+        };
+        let mut mesh = Mesh::<S>::from_triangles(vertices, &triangles);
+        let mut random = Random(seed + 1);
+        for _ in 0..80 {
+            let edges = live_edges(&mesh);
+            if edges.is_empty() {
+                break;
+            }
+            let star = mesh.edge_star(edges[random.below(edges.len())]);
+            let e = star[random.below(star.len())];
+            if mesh.link_condition(e) {
+                mesh.collapse(e);
+                continue;
+            }
+            let Some(contraction) = mesh.contraction(e) else {
+                continue;
+            };
+            let singular = |m: &Mesh<S>| {
+                let edges = live_edges(m);
+                let faces = |e: &EdgeId| m.edge_star(*e).len();
+                let vertices = m.vertices().filter(|&v| m.is_non_manifold_vertex(v));
+                let boundary = edges.iter().filter(|e| faces(e) == 1).count();
+                let most = edges.iter().map(faces).max().unwrap_or(0);
+                (
+                    m.non_manifold_edge_count(),
+                    vertices.count(),
+                    boundary,
+                    most.max(2),
+                )
+            };
+            let (before, faces) = (singular(&mesh), mesh.face_count());
+            let record = mesh.contract(&contraction);
+            mesh.check()
+                .unwrap_or_else(|w| panic!("seed {seed}, {e:?}, {record:?}: {w}"));
+            let after = singular(&mesh);
+            assert!(after.0 <= before.0, "seed {seed}: {before:?} -> {after:?}");
+            assert!(after.1 <= before.1, "seed {seed}: {before:?} -> {after:?}");
+            assert!(after.2 <= before.2, "seed {seed}: {before:?} -> {after:?}");
+            assert!(after.3 <= before.3, "seed {seed}: {before:?} -> {after:?}");
+            assert_eq!(mesh.face_count() + record.dead_faces.len(), faces);
+            contractions += 1;
+        }
+    }
+    assert!(contractions > 300, "{contractions}");
+}
+
+/// Components partition the faces, and each can be taken out alone.
+fn a_component_is_removed_alone<S: EdgeStore>() {
+    for seed in 0..60 {
+        let (vertices, mut triangles) = random_complex(seed);
+        let (more, others) = random_complex(seed + 100);
+        triangles.extend(others.iter().map(|t| t.map(|v| v + vertices as u32)));
+        let mut mesh = Mesh::<S>::from_triangles(vertices + more, &triangles);
+        let components = mesh.components();
+        let faces: usize = components.iter().map(Vec::len).sum();
+        assert_eq!(faces, mesh.face_count());
+        let parts = usize::from(!others.is_empty()) + usize::from(triangles.len() > others.len());
+        assert!(components.len() >= parts, "seed {seed}");
+        for component in &components {
+            let faces = mesh.face_count();
+            mesh.remove_component(component);
+            mesh.check().unwrap();
+            assert_eq!(mesh.face_count() + component.len(), faces, "seed {seed}");
+        }
+        assert_eq!(
+            (mesh.vertex_count(), mesh.non_manifold_edge_count()),
+            (0, 0)
+        );
+    }
+}
+
 for_each_tier!(
+    a_component_is_removed_alone,
+    contractions_make_nothing_worse,
     opposites_equal_brute_force,
     queries_equal_brute_force,
     collapses_keep_tables_and_topology,

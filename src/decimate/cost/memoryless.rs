@@ -237,8 +237,9 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         changed.push(kept);
         self.refresh(surface, kept);
         changed.extend(surface.mesh.neighbours(kept));
-        if surface.mesh.is_non_manifold_vertex(kept) {
-            // A vertex where many fans end is met once for each.
+        changed.extend(&merged.around);
+        if !merged.around.is_empty() || surface.mesh.is_non_manifold_vertex(kept) {
+            // A vertex where many fans end is met once for each, one around maybe twice.
             changed[1..].sort_unstable();
             changed.dedup();
         }
