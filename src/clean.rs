@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::indexed_mesh::IndexedMesh;
+use crate::indexed_mesh::{IndexedMesh, Parts};
 
 /// What cleaning found and did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -31,16 +31,23 @@ pub struct Cleaning {
 /// The mesh as a simplicial complex: no repeated vertex in a face, no face twice, every vertex used
 /// and finite; `weld` merges vertices at equal positions first.
 ///
-/// Vertices and faces keep their order, the first of equals stays. Needs 12 bytes a vertex and 4 a
+/// Vertices and faces keep their order, the first of equals stays, with the largest of the welded
+/// vertices' weights. Needs 12 bytes a vertex and 4 a
 /// face beside the mesh. Expected linear time, but for a logarithm in the faces at a vertex.
 ///
 /// # Errors
 /// None today; the sizes of the result are checked like those of any mesh.
 pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
     let mut counts = Cleaning::default();
-    let (origin, mut positions, mut triangles, mut double_sided) = mesh.into_parts();
+    let Parts {
+        origin,
+        mut positions,
+        mut triangles,
+        mut double_sided,
+        mut weights,
+    } = mesh.into_parts();
     if weld {
-        counts.welded_vertices = weld_positions(&positions, &mut triangles);
+        counts.welded_vertices = weld_positions(&positions, &mut triangles, &mut weights);
     }
 
     let mut keep: Vec<bool> = Vec::with_capacity(triangles.len());
@@ -84,11 +91,13 @@ pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
             .flatten()
             .for_each(|v| *v = renamed[*v as usize]);
         retain(&used, &mut positions);
+        retain(&used, &mut weights);
     }
     counts.kept_vertices = positions.len();
     counts.kept_faces = triangles.len();
-    let mesh =
-        IndexedMesh::with_origin(origin, positions, triangles)?.with_double_sided(double_sided)?;
+    let mesh = IndexedMesh::with_origin(origin, positions, triangles)?
+        .with_double_sided(double_sided)?
+        .with_weights(weights)?;
     Ok((mesh, counts))
 }
 
@@ -99,9 +108,9 @@ fn retain<T>(keep: &[bool], values: &mut Vec<T>) {
     values.shrink_to_fit();
 }
 
-/// Lets every triangle name the first vertex at each position, and returns how many others there
-/// were. Positions that are not finite are left alone.
-fn weld_positions(positions: &[Vec3], triangles: &mut [[u32; 3]]) -> usize {
+/// Lets every triangle name the first vertex at each position, which takes the largest weight there,
+/// and returns how many others there were. Positions that are not finite are left alone.
+fn weld_positions(positions: &[Vec3], triangles: &mut [[u32; 3]], weights: &mut [f32]) -> usize {
     // Open addressing over vertex ids; slots hold id + 1, 0 is free.
     let capacity = (2 * positions.len()).next_power_of_two().max(2);
     let mut slots = vec![0u32; capacity];
@@ -132,6 +141,10 @@ fn weld_positions(positions: &[Vec3], triangles: &mut [[u32; 3]]) -> usize {
             .iter_mut()
             .flatten()
             .for_each(|v| *v = first[*v as usize]);
+        for v in 0..weights.len() {
+            let at_first = first[v] as usize;
+            weights[at_first] = weights[at_first].max(weights[v]);
+        }
     }
     welded
 }
@@ -244,6 +257,20 @@ mod tests {
         let (apart, counts) = clean(soup.clone(), false).unwrap();
         assert_eq!(apart, soup);
         assert_eq!(counts.welded_vertices, 0);
+    }
+
+    /// The soup above with a lone vertex in front: of 2 and 7 at one place 7 is left, wherever it
+    /// stood, and the lone vertex takes its weight along.
+    #[test]
+    fn welded_vertices_keep_the_largest_weight() {
+        let [a, b, c, d] = SQUARE;
+        let soup = mesh(&[[9.; 3], a, b, c, a, c, d], &[[1, 2, 3], [4, 5, 6]])
+            .with_weights(vec![5.0, 2.0, 3.0, f32::INFINITY, 7.0, 0.5, 0.0])
+            .unwrap();
+        let (welded, _) = clean(soup.clone(), true).unwrap();
+        assert_eq!(welded.weights(), [7.0, 3.0, f32::INFINITY, 0.0]);
+        let (apart, _) = clean(soup.clone(), false).unwrap();
+        assert_eq!(apart.weights(), &soup.weights()[1..]);
     }
 
     /// One face of each kind: repeated vertex, not finite, same-way duplicate (rotated), opposite.

@@ -128,6 +128,11 @@ pub struct Run {
         help_heading = "Surface"
     )]
     pub feature_angle: Option<f64>,
+    /// The vertex property of a PLY input that multiplies the cost around each vertex: more is kept
+    /// where it is larger. Numbers of 0 or more, of which only the ratios count; inf keeps a vertex
+    /// where it is, bit for bit.
+    #[arg(long, value_name = "PROPERTY", help_heading = "Surface")]
+    pub vertex_weight: Option<String>,
     /// What may happen to boundaries.
     #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
     pub boundary: BoundaryArg,

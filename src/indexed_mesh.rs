@@ -23,6 +23,22 @@ pub struct IndexedMesh {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     double_sided: Vec<bool>,
+    weights: Vec<f32>,
+}
+
+/// A mesh taken apart.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Parts {
+    /// [`IndexedMesh::origin`].
+    pub origin: DVec3,
+    /// [`IndexedMesh::positions`].
+    pub positions: Vec<Vec3>,
+    /// [`IndexedMesh::triangles`].
+    pub triangles: Vec<[u32; 3]>,
+    /// [`IndexedMesh::double_sided`].
+    pub double_sided: Vec<bool>,
+    /// [`IndexedMesh::weights`].
+    pub weights: Vec<f32>,
 }
 
 impl IndexedMesh {
@@ -58,6 +74,7 @@ impl IndexedMesh {
             positions,
             triangles,
             double_sided: Vec::new(),
+            weights: Vec::new(),
         })
     }
 
@@ -107,6 +124,39 @@ impl IndexedMesh {
         Ok(self)
     }
 
+    /// What a cost is multiplied by around each vertex, infinite for one that must stay where it is;
+    /// or nothing where all weigh 1.
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
+    /// Weighs the vertices: one weight each, 0 or more, or an empty list for 1 everywhere.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] where a weight is negative or no number, or the list is neither empty
+    /// nor as long as the vertices.
+    pub fn with_weights(mut self, weights: Vec<f32>) -> Result<Self> {
+        if !weights.is_empty() && weights.len() != self.positions.len() {
+            return Err(Error::InvalidMesh(format!(
+                "{} weights for {} vertices",
+                weights.len(),
+                self.positions.len()
+            )));
+        }
+        if let Some(v) = weights.iter().position(|w| w.is_nan() || *w < 0.0) {
+            return Err(Error::InvalidMesh(format!(
+                "vertex {v} has the weight {}; 0 or more is expected (counted from 0)",
+                weights[v]
+            )));
+        }
+        self.weights = if weights.iter().any(|&w| w != 1.0) {
+            weights
+        } else {
+            Vec::new()
+        };
+        Ok(self)
+    }
+
     /// The number of triangles a file of this mesh holds: double-sided ones count as two.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len() + self.double_sided.iter().filter(|&&d| d).count()
@@ -140,14 +190,22 @@ impl IndexedMesh {
             .map_or(0.0, |(min, max)| (max.as_dvec3() - min.as_dvec3()).length())
     }
 
-    /// The mesh taken apart: origin, positions, triangles, double-sided flags.
-    pub fn into_parts(self) -> (DVec3, Vec<Vec3>, Vec<[u32; 3]>, Vec<bool>) {
-        (
-            self.origin,
-            self.positions,
-            self.triangles,
-            self.double_sided,
-        )
+    /// The mesh taken apart.
+    pub fn into_parts(self) -> Parts {
+        let Self {
+            origin,
+            positions,
+            triangles,
+            double_sided,
+            weights,
+        } = self;
+        Parts {
+            origin,
+            positions,
+            triangles,
+            double_sided,
+            weights,
+        }
     }
 
     /// The bytes that the arrays hold.
@@ -155,6 +213,7 @@ impl IndexedMesh {
         self.positions.capacity() * size_of::<Vec3>()
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.double_sided.capacity()
+            + self.weights.capacity() * size_of::<f32>()
     }
 }
 
@@ -342,6 +401,24 @@ mod tests {
                 .contains("triangle 0 uses vertices 0, 1, 3"),
             "{error}"
         );
+    }
+
+    /// A weight for each vertex or for none, and none that a cost cannot be multiplied by.
+    #[test]
+    fn weights_are_checked() {
+        let square = || IndexedMesh::new(vec![Vec3::ZERO; 4], vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        for (weights, expected) in [
+            (vec![1.0; 3], "3 weights for 4 vertices"),
+            (vec![1.0, f32::NAN, 1.0, 1.0], "vertex 1 has the weight NaN"),
+            (vec![1.0, 1.0, 1.0, -0.5], "vertex 3 has the weight -0.5"),
+        ] {
+            let error = square().with_weights(weights).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        let weights = [0.0, 1.0, f32::INFINITY, 1.0];
+        let weighted = square().with_weights(weights.into()).unwrap();
+        assert_eq!(weighted.weights(), weights);
+        assert_eq!(square().with_weights(vec![1.0; 4]).unwrap(), square());
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! use decimate::io;
 //!
 //! # fn main() -> decimate::error::Result<()> {
-//! let mesh = io::read("data/sample.ply".as_ref(), None)?;
+//! let mesh = io::read("data/sample.ply".as_ref(), &io::ReadOptions::default())?;
 //! let targets = Targets { ratio: Some(0.1), ..Targets::default() };
 //! let (small, report) = decimate(mesh, &Options { targets, ..Options::default() })?;
 //! assert_eq!(small.triangle_count(), report.triangles_out);

@@ -14,7 +14,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use decimate::decimate::{Progress, decimate_with_progress, peak_rss_bytes};
 use decimate::error::Error;
-use decimate::io::{self, WriteOptions};
+use decimate::io::{self, ReadOptions, WriteOptions};
 use decimate::metrics::{CompareOptions, Reference, info};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -76,7 +76,11 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     io::check_place(output)?;
 
     let start = Instant::now();
-    let mesh = io::read(input, args.input_format)?;
+    let read_options = ReadOptions {
+        format: args.input_format,
+        vertex_weight: args.vertex_weight.clone(),
+    };
+    let mesh = io::read(input, &read_options)?;
     let read_seconds = start.elapsed().as_secs_f64();
 
     let bar = progress_bar(args.quiet);
@@ -107,7 +111,11 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
 }
 
 fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
-    let mesh = io::read(&args.mesh, args.input_format)?;
+    let read_options = ReadOptions {
+        format: args.input_format,
+        ..ReadOptions::default()
+    };
+    let mesh = io::read(&args.mesh, &read_options)?;
     let info = info(mesh, !args.no_weld).map_err(|error| name_mesh(error, &args.mesh))?;
     if args.json {
         write_json(Path::new("-"), &info)?;
@@ -122,7 +130,8 @@ fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
 fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
     use_threads(args.threads)?;
     let name = |error| name_mesh(error, &args.reference);
-    let reference = Reference::new(io::read(&args.reference, None)?).map_err(name)?;
+    let read = |path| io::read(path, &ReadOptions::default());
+    let reference = Reference::new(read(&args.reference)?).map_err(name)?;
     let options = CompareOptions {
         samples: args.samples,
         intersections: args.intersections,
@@ -130,7 +139,7 @@ fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
     let mut compared = Vec::new();
     for path in &args.meshes {
         let comparison = reference
-            .compare(io::read(path, None)?, &options)
+            .compare(read(path)?, &options)
             .map_err(|error| name_mesh(error, path))?;
         compared.push(Compared {
             reference_file: args.reference.display().to_string(),

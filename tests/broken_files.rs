@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use decimate::io;
+use decimate::io::{self, ReadOptions};
 
 /// `expected.tsv` has a line `file<TAB>message` for each file, and each file has a line.
 #[test]
@@ -18,7 +18,7 @@ fn broken_files_give_the_message_that_they_ask_for() {
             listed.insert(name.to_string()),
             "{name} stands twice in expected.tsv"
         );
-        let found = match io::read(&folder.join(name), None) {
+        let found = match io::read(&folder.join(name), &ReadOptions::default()) {
             Ok(mesh) => format!("read {} triangles", mesh.triangle_count()),
             Err(error) => error.to_string(),
         };

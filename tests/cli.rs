@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 
 use decimate::decimate::needed_bytes;
 use decimate::indexed_mesh::IndexedMesh;
-use decimate::io::{self, WriteOptions};
+use decimate::io::{self, ReadOptions, WriteOptions};
 use decimate::mesh::Tier;
 use glam::Vec3;
 use serde_json::Value;
@@ -101,7 +101,7 @@ impl Folder {
     }
 
     fn mesh(&self, name: &str) -> IndexedMesh {
-        io::read(&self.0.path().join(name), None).unwrap()
+        io::read(&self.0.path().join(name), &ReadOptions::default()).unwrap()
     }
 
     fn write_mesh(&self, name: &str, mesh: &IndexedMesh) {
@@ -767,6 +767,84 @@ fn a_locked_boundary_keeps_its_bits() {
     // Without the lock it gives way, or the test above would show nothing.
     folder.run("sample.ply -o out.ply --ratio 0.02");
     assert!(rim(&folder.mesh("out.ply")).len() < before.len());
+}
+
+/// `hill.ply` as text, with a property `kept` behind the coordinates of each vertex.
+fn hill_with_property(of: impl Fn(&Vec3) -> &'static str) -> String {
+    let hill = hill(20);
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nproperty double kept\nelement face {}\n\
+         property list uchar int vertex_indices\nend_header\n",
+        hill.positions().len(),
+        hill.triangles().len()
+    );
+    for p in hill.positions() {
+        text += &format!("{} {} {} {}\n", p.x, p.y, p.z, of(p));
+    }
+    for [a, b, c] in hill.triangles() {
+        text += &format!("3 {a} {b} {c}\n");
+    }
+    text
+}
+
+/// The vertices on a line across stay, to the bit; the output, a plain mesh, has no such property.
+/// Where all weigh the same nothing changes.
+#[test]
+fn a_vertex_weight_is_read_from_a_property() {
+    let folder = Folder::with_hill();
+    let on_line = |p: &Vec3| p.x == 0.5;
+    let lines = |name| -> BTreeSet<Bits> {
+        let mesh = folder.mesh(name);
+        let on_line = mesh.positions().iter().filter(|p| on_line(p));
+        on_line.map(bits).collect()
+    };
+    folder.write(
+        "line.ply",
+        &hill_with_property(|p| if on_line(p) { "inf" } else { "1" }),
+    );
+    folder.write("even.ply", &hill_with_property(|_| "2.5"));
+    for (input, output) in [
+        ("line.ply --vertex-weight kept", "line_out.ply"),
+        ("even.ply --vertex-weight kept", "even_out.ply"),
+        ("line.ply", "plain_out.ply"),
+    ] {
+        let ran = folder.run(&format!("{input} -o {output} --triangles 100"));
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+    }
+    assert_eq!(lines("line_out.ply"), lines("hill.ply"));
+    assert!(lines("plain_out.ply").len() < lines("hill.ply").len());
+    assert!(folder.bytes("even_out.ply") == folder.bytes("plain_out.ply"));
+    let header = String::from_utf8_lossy(&folder.bytes("line_out.ply")[..200]).into_owned();
+    assert!(
+        header.contains("end_header") && !header.contains("kept"),
+        "{header}"
+    );
+}
+
+#[test]
+fn a_vertex_weight_that_is_not_there_is_1_and_named() {
+    let folder = Folder::with_hill();
+    folder.write("wrong.ply", &hill_with_property(|_| "-2"));
+    folder.run("hill.ply -o hill.obj --ratio 1");
+    for (arguments, needle) in [
+        (
+            "hill.ply --vertex-weight kept",
+            "hill.ply: vertex has no property 'kept'; expected one of x, y, z",
+        ),
+        (
+            "wrong.ply --vertex-weight kept",
+            "wrong.ply:11: vertex 0 has the weight -2; expected 0 or more",
+        ),
+        (
+            "hill.obj --vertex-weight kept",
+            "hill.obj: obj has no vertex property 'kept'; expected ply",
+        ),
+    ] {
+        let ran = folder.run(&format!("{arguments} -o out.ply --ratio 0.5"));
+        ran.failed(1, needle);
+    }
+    assert!(!folder.names().contains("out.ply"));
 }
 
 /// A weight on the boundary keeps it where it is; without one it is cut short.

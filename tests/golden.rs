@@ -3,7 +3,7 @@
 
 use decimate::decimate::{Options, Targets, TierChoice, decimate};
 use decimate::indexed_mesh::IndexedMesh;
-use decimate::io;
+use decimate::io::{self, ReadOptions};
 use decimate::mesh::Tier;
 use decimate::metrics::{CompareOptions, Comparison, Reference};
 use glam::Vec3;
@@ -111,7 +111,7 @@ fn cases() -> Vec<Case> {
         let waves = 0.05 * (9.0 * u).sin() * (7.0 * v).cos() + 0.01 * (40.0 * u * v).sin();
         [u, v, waves]
     });
-    let sample = io::read("data/sample.ply".as_ref(), None).unwrap();
+    let sample = io::read("data/sample.ply".as_ref(), &ReadOptions::default()).unwrap();
     vec![
         case(
             "sphere",

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use decimate::indexed_mesh::IndexedMesh;
-use decimate::io::{self, Format, WriteOptions};
+use decimate::io::{self, Format, ReadOptions, WriteOptions};
 use glam::{DVec3, Vec3};
 
 /// Every way to write a mesh, with the name of the file.
@@ -20,7 +20,7 @@ fn write_and_read(mesh: &IndexedMesh, name: &str, options: &WriteOptions) -> Ind
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(name);
     io::write(&path, mesh, options).unwrap();
-    io::read(&path, None).unwrap()
+    io::read(&path, &ReadOptions::default()).unwrap()
 }
 
 /// A mesh's triangles as the bits of their corners, which STL keeps as well.
@@ -241,7 +241,11 @@ fn damaged_files_never_panic() {
         }
         for bytes in damaged {
             std::fs::write(&path, bytes).unwrap();
-            refused += usize::from(io::read(&path, Some(format)).is_err());
+            let options = ReadOptions {
+                format: Some(format),
+                ..ReadOptions::default()
+            };
+            refused += usize::from(io::read(&path, &options).is_err());
         }
     }
     assert!(

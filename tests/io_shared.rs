@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use decimate::io;
+use decimate::io::{self, ReadOptions};
 
 /// The vertices and triangles that each file holds, before any welding.
 const COUNTS: [(&str, usize, usize); 18] = [
@@ -91,7 +91,8 @@ fn every_mesh_has_the_counts_of_its_manifest() {
         return;
     };
     for (name, vertices, triangles) in COUNTS {
-        let mesh = io::read(&folder.join(name), None).unwrap_or_else(|e| panic!("{e}"));
+        let mesh =
+            io::read(&folder.join(name), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(
             (mesh.positions().len(), mesh.triangles().len()),
             (vertices, triangles),
@@ -109,7 +110,7 @@ fn malformed_files_are_read_or_refused_at_once() {
     };
     for (name, expected) in MALFORMED {
         let start = Instant::now();
-        let result = io::read(&folder.join(name), None);
+        let result = io::read(&folder.join(name), &ReadOptions::default());
         let seconds = start.elapsed().as_secs_f64();
         let found = result
             .as_ref()

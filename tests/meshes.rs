@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use decimate::decimate::{Options, Report, StopReason, Targets, TierChoice, decimate};
 use decimate::indexed_mesh::IndexedMesh;
-use decimate::io;
+use decimate::io::{self, ReadOptions};
 use decimate::mesh::Tier;
 use decimate::metrics::{Info, info};
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ fn decimation_keeps_its_promises_on_every_mesh() {
 /// Every promise that does not hold for a file, at any ratio or in any tier.
 fn broken_promises(file: &Path) -> Vec<String> {
     let name = file.file_name().unwrap().display();
-    let input = io::read(file, None).unwrap_or_else(|error| panic!("{error}"));
+    let input = io::read(file, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let before = info(input.clone(), true).unwrap();
     let ratios = if input.triangle_count() > LARGE {
         &RATIOS[..1]
@@ -277,7 +277,8 @@ fn malformed_files_are_decimated_or_refused() {
             let left = folder.path().read_dir().unwrap().count();
             match ran.status.code() {
                 Some(0) if command == "decimate" => {
-                    let small = io::read(&output, None).unwrap_or_else(|e| panic!("{what}: {e}"));
+                    let small = io::read(&output, &ReadOptions::default())
+                        .unwrap_or_else(|e| panic!("{what}: {e}"));
                     assert!(small.positions().iter().all(|p| p.is_finite()), "{what}");
                     is_a_complex(&small, &mut |wrong| {
                         // A double-sided face is written as two.
@@ -302,7 +303,7 @@ fn malformed_files_are_decimated_or_refused() {
 #[test]
 fn broken_promises_are_found() {
     let cube = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube_quads.obj");
-    let cube = io::read(&cube, None).unwrap();
+    let cube = io::read(&cube, &ReadOptions::default()).unwrap();
     let before = info(cube.clone(), true).unwrap();
     let (same, report) = run(&cube, 1.0, Tier::Small, true);
     let said = |positions: &[glam::Vec3], triangles: &[[u32; 3]]| {
@@ -347,7 +348,7 @@ fn broken_promises_are_found() {
     turned[0].swap(0, 1);
     assert!(said(positions, &turned).contains("inconsistent edges"));
 
-    let mut nearly = same.clone().into_parts().1;
+    let mut nearly = same.clone().into_parts().positions;
     nearly[0].x = -0.0;
     let nearly = IndexedMesh::new(nearly, triangles.to_vec()).unwrap();
     assert!(nearly == same && !is_same(&nearly, &same), "−0 is not 0");

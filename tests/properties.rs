@@ -13,8 +13,8 @@ use decimate::decimate::{
     decimate,
 };
 use decimate::error::Error;
-use decimate::indexed_mesh::IndexedMesh;
-use decimate::io::{self, WriteOptions};
+use decimate::indexed_mesh::{IndexedMesh, Parts};
+use decimate::io::{self, ReadOptions, WriteOptions};
 use decimate::mesh::Tier;
 use decimate::metrics::{Info, info};
 use glam::{DVec3, Vec3};
@@ -701,7 +701,12 @@ fn the_order_of_faces_does_not_reach_the_topology() {
             return;
         };
         let mut random = Random::of(!case);
-        let (origin, positions, mut triangles, _) = mesh.into_parts();
+        let Parts {
+            origin,
+            positions,
+            mut triangles,
+            ..
+        } = mesh.into_parts();
         random.shuffle(&mut triangles);
         for triangle in &mut triangles {
             triangle.rotate_left(random.below(3));
@@ -729,10 +734,10 @@ fn scaling_by_a_power_of_two_scales_the_output() {
             return;
         };
         let scaled = |mesh: &IndexedMesh| {
-            let (origin, positions, triangles, flags) = mesh.clone().into_parts();
-            let positions = positions.into_iter().map(|p| p * 8.0).collect();
-            let mesh = IndexedMesh::with_origin(origin, positions, triangles).unwrap();
-            mesh.with_double_sided(flags).unwrap()
+            let parts = mesh.clone().into_parts();
+            let positions = parts.positions.into_iter().map(|p| p * 8.0).collect();
+            let mesh = IndexedMesh::with_origin(parts.origin, positions, parts.triangles).unwrap();
+            mesh.with_double_sided(parts.double_sided).unwrap()
         };
         options.targets.max_error = options.targets.max_error.map(|e| e * 8.0);
         let (other, _) = decimated(case, &scaled(&mesh), &options).expect("has triangles");
@@ -776,7 +781,7 @@ fn results_survive_every_format() {
                 ..WriteOptions::default()
             };
             io::write(&path, &output, &write).unwrap();
-            let back = io::read(&path, None).unwrap();
+            let back = io::read(&path, &ReadOptions::default()).unwrap();
             std::fs::remove_file(&path).unwrap();
             let what = format!("case {case}, {extension}, ascii {ascii}");
             assert_eq!(corners(&back), corners(&output), "{what}");

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use crate::clean::{Cleaning, clean};
 use crate::error::{Error, Result};
-use crate::indexed_mesh::IndexedMesh;
+use crate::indexed_mesh::{IndexedMesh, Parts};
 use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
@@ -48,7 +48,9 @@ pub struct Progress {
 ///
 /// The mesh is cleaned first (see [`clean`]); then the cheapest edge is collapsed, again and again.
 /// Topology is kept: closed stays closed; components, boundary loops and the Euler characteristic
-/// stay; nothing non-manifold is born; no face turns by more than 90°. The result depends on the
+/// stay; nothing non-manifold is born; no face turns by more than 90°. Where the mesh has
+/// [weights](IndexedMesh::weights), they multiply what a collapse costs; only their ratios count, and
+/// an infinite one keeps its vertex, bit for bit. The result carries none. It depends on the
 /// mesh and the options alone, not on the tier or the number of threads.
 ///
 /// # Errors
@@ -131,7 +133,13 @@ fn run<S: EdgeStore>(
 ) -> Result<IndexedMesh> {
     let start = Instant::now();
     let diagonal = input.diagonal();
-    let (origin, positions, triangles, double_sided) = input.into_parts();
+    let Parts {
+        origin,
+        positions,
+        triangles,
+        double_sided,
+        weights,
+    } = input.into_parts();
     let Oriented {
         mesh, mut flipped, ..
     } = Mesh::<S>::oriented(positions.len(), triangles);
@@ -151,6 +159,7 @@ fn run<S: EdgeStore>(
     report.build_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
+    surface.weigh(weights);
     if options.boundary == Boundary::Lock {
         surface.lock_boundary();
     }

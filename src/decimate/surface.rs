@@ -37,6 +37,10 @@ pub struct Surface<S> {
     pub lost: f64,
 }
 
+/// The largest weight, relative to the middle one: large enough to leave a vertex for the last, and
+/// small enough for what it multiplies to stay finite in single precision.
+const LARGEST_WEIGHT: f32 = 1e20;
+
 impl<S: EdgeStore> Surface<S> {
     /// Whether the vertex must not move.
     #[inline]
@@ -52,7 +56,8 @@ impl<S: EdgeStore> Surface<S> {
 
     /// Locks the vertices on boundary edges.
     pub fn lock_boundary(&mut self) {
-        let mut locked = vec![false; self.mesh.vertex_slots()];
+        let mut locked = std::mem::take(&mut self.locked);
+        locked.resize(self.mesh.vertex_slots(), false);
         for e in self.mesh.edges().filter(|&e| self.mesh.is_boundary(e)) {
             for v in self.mesh.edge_vertices(e) {
                 locked[v.index()] = true;
@@ -73,6 +78,30 @@ impl<S: EdgeStore> Surface<S> {
             self.mesh.face_count()
         } else {
             self.mesh.faces().map(|f| self.sides(f)).sum()
+        }
+    }
+
+    /// Weighs the vertices: one weight each, or none. Infinite ones lock; of the others only the
+    /// ratios count. The middle one becomes 1, the weight that the costs' tie-break is made for.
+    pub fn weigh(&mut self, mut weights: Vec<f32>) {
+        let is_proper = |w: &f32| *w > 0.0 && w.is_finite();
+        let mut proper: Vec<f32> = weights.iter().copied().filter(is_proper).collect();
+        let half = proper.len() / 2;
+        let middle = if proper.is_empty() {
+            1.0
+        } else {
+            *proper.select_nth_unstable_by(half, f32::total_cmp).1
+        };
+        for (v, weight) in weights.iter_mut().enumerate() {
+            if weight.is_infinite() {
+                self.lock(VertexId::new(v));
+                *weight = 1.0;
+            } else {
+                *weight = (*weight / middle).min(LARGEST_WEIGHT);
+            }
+        }
+        if weights.iter().any(|&w| w != 1.0) {
+            self.weights = weights;
         }
     }
 

@@ -244,6 +244,63 @@ fn a_locked_boundary_keeps_its_bits<S: EdgeStore>() {
     assert!(report.triangles_out <= 100);
 }
 
+/// A bumpy grid with the weight that `of` gives each of its vertices.
+fn weighted(n: u32, of: impl Fn(Vec3) -> f32) -> IndexedMesh {
+    let bumpy = mesh(bumpy(n));
+    let weights = bumpy.positions().iter().map(|&p| of(p)).collect();
+    bumpy.with_weights(weights).unwrap()
+}
+
+/// Of a grid, the middle column and the corners must not move: they are there afterwards, whatever
+/// the quality and whether the boundary is locked beside.
+fn an_infinite_weight_keeps_the_bits<S: EdgeStore>() {
+    let is_kept = |p: &Vec3| p.x == 0.5 || (p.x * p.y == 0.0 && p.x + p.y == 1.0);
+    let weigh = |p| if is_kept(&p) { f32::INFINITY } else { p.y };
+    let kept = |mesh: &IndexedMesh| -> Vec<_> {
+        let kept = mesh.positions().iter().filter(|p| is_kept(p));
+        let mut kept: Vec<_> = kept.map(|p| p.to_array().map(f32::to_bits)).collect();
+        kept.sort_unstable();
+        kept
+    };
+    let before = weighted(16, weigh);
+    assert_eq!(kept(&before).len(), 17 + 2);
+    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+        for boundary in [Boundary::Keep, Boundary::Lock] {
+            let options = tiered::<S>(Options {
+                quality,
+                boundary,
+                ..to_triangles(160)
+            });
+            let (small, report) = decimate(before.clone(), &options).unwrap();
+            assert!(report.triangles_out <= 160, "{quality:?} {boundary:?}");
+            assert_eq!(kept(&small), kept(&before), "{quality:?} {boundary:?}");
+        }
+    }
+}
+
+/// With 100 times the weight, the left half of a grid keeps most of the triangles; with 1, half.
+fn a_heavy_half_keeps_more<S: EdgeStore>() {
+    let left = |heavy: f32, quality| {
+        let weigh = |p: Vec3| if p.x < 0.5 { heavy } else { 1.0 };
+        let options = Options {
+            quality,
+            ..to_triangles(200)
+        };
+        let (small, _) = decimate(weighted(24, weigh), &tiered::<S>(options)).unwrap();
+        let sum_x = |t: &&[u32; 3]| {
+            t.map(|v| small.positions()[v as usize].x)
+                .iter()
+                .sum::<f32>()
+        };
+        small.triangles().iter().filter(|t| sum_x(t) < 1.5).count()
+    };
+    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+        let (even, heavy) = (left(1.0, quality), left(100.0, quality));
+        assert!((80..120).contains(&even), "{quality:?}: {even} of 200");
+        assert!(heavy > 150, "{quality:?}: {heavy} of 200, {even} evenly");
+    }
+}
+
 /// A free boundary costs nothing and so shrinks; a kept one stays.
 fn a_free_boundary_moves_more_than_a_kept_one<S: EdgeStore>() {
     let area = |boundary| {
@@ -366,6 +423,8 @@ for_each_tier!(
     topology_is_kept_to_the_end,
     three_fins_come_down_to_three_triangles,
     a_locked_boundary_keeps_its_bits,
+    an_infinite_weight_keeps_the_bits,
+    a_heavy_half_keeps_more,
     a_free_boundary_moves_more_than_a_kept_one,
     endpoint_placement_takes_a_subset,
     an_error_limit_is_kept,
@@ -414,6 +473,80 @@ fn scaling_by_a_power_of_two_scales_the_result() {
         assert_eq!(small.triangles(), expected.triangles(), "2^{power}");
         for (p, q) in small.positions().iter().zip(expected.positions()) {
             assert_eq!(*p, *q * factor, "2^{power}");
+        }
+    }
+}
+
+/// Only the ratios of the weights count: a power of two in all of them changes nothing, nor does the
+/// same weight everywhere. 0 and what single precision cannot multiply are among them.
+#[test]
+fn scaling_the_weights_changes_nothing() {
+    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+        let run = |mesh| {
+            let options = Options {
+                quality,
+                ..to_triangles(150)
+            };
+            decimate(mesh, &options).unwrap().0
+        };
+        let weigh = |p: Vec3| match p.x {
+            0.0 => 0.0,
+            x if x < 0.2 => 1e25,
+            x => x * x + p.y,
+        };
+        let expected = run(weighted(20, weigh));
+        for power in [-60, -3, 1, 40] {
+            let scaled = weighted(20, |p| weigh(p) * 2f32.powi(power));
+            assert!(run(scaled) == expected, "{quality:?}, 2^{power}");
+        }
+        let even = run(mesh(bumpy(20)));
+        assert!(even != expected, "the weights do nothing");
+        for weight in [0.3, 1.0, 1e30] {
+            assert!(run(weighted(20, |_| weight)) == even, "{weight}");
+        }
+    }
+}
+
+/// Beside a light sphere, which goes first, a heavy one keeps its volume like one alone: it is the
+/// weights that grow, not the faces.
+#[test]
+fn a_heavy_sphere_keeps_its_volume() {
+    let (mut positions, mut triangles) = shapes::icosphere(4);
+    let light = positions.len();
+    let (heavy, faces) = shapes::icosphere(3);
+    positions.extend(heavy.iter().map(|&p| p + 4.0 * Vec3::X));
+    triangles.extend(faces.iter().map(|t| t.map(|v| v + light as u32)));
+    let volume = |positions: &[Vec3], triangles: &[[u32; 3]]| -> f32 {
+        let corners = |t: &[u32; 3]| t.map(|v| positions[v as usize] - 4.0 * Vec3::X);
+        let six = |[a, b, c]: [Vec3; 3]| a.dot(b.cross(c));
+        let of_heavy = triangles.iter().map(corners).filter(|c| c[0].x > -2.0);
+        of_heavy.map(six).sum::<f32>() / 6.0
+    };
+    let before = volume(&positions, &triangles);
+    let mut weights = vec![1.0; positions.len()];
+    weights[light..].fill(1e8);
+    let pair = mesh((positions, triangles)).with_weights(weights).unwrap();
+    let (small, _) = decimate(pair, &to_triangles(104)).unwrap();
+    let ratio = volume(small.positions(), small.triangles()) / before;
+    assert!((ratio - 1.0).abs() < 1e-3, "{ratio} of the volume");
+}
+
+/// Weights so small, so large or so far apart that their products leave single precision.
+#[test]
+fn extreme_weights_stop_nothing() {
+    let weights = [0.0, f32::MIN_POSITIVE, 1e-20, 1.0, 1e20, f32::MAX];
+    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+        for few in 1..=weights.len() {
+            let mix = |p: Vec3| weights[(p.x * 97.0 + p.y * 31.0) as usize % few];
+            let options = Options {
+                quality,
+                ..to_triangles(2)
+            };
+            let (_, report) = decimate(weighted(10, mix), &options).unwrap();
+            assert!(
+                report.triangles_out <= 8,
+                "{quality:?}, {few} weights: {report:?}"
+            );
         }
     }
 }

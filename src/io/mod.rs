@@ -8,7 +8,7 @@
 //! | OFF | OFF, COFF, NOFF, CNOFF, STOFF as text | text |
 //!
 //! Files are read in blocks, from standard input as from disk. What a header promises never sizes
-//! an allocation; what is not connectivity or position is skipped.
+//! an allocation; what is neither connectivity nor position, nor the weight asked for, is skipped.
 
 mod input;
 mod obj;
@@ -24,7 +24,7 @@ use std::io::Write;
 use std::path::Path;
 use std::str::FromStr;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::IndexedMesh;
 
 pub use output::{check_place, write_file};
@@ -87,6 +87,16 @@ impl FromStr for Format {
 /// What messages list where a format is none of ours.
 const KNOWN_FORMATS: &str = "ply, obj, stl or off";
 
+/// How a mesh is read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// The format, or `None` for the one that content or extension tell.
+    pub format: Option<Format>,
+    /// The scalar property of a PLY file's vertices that becomes their
+    /// [weight](IndexedMesh::weights).
+    pub vertex_weight: Option<String>,
+}
+
 /// How a mesh is written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct WriteOptions {
@@ -107,20 +117,29 @@ pub struct WriteOptions {
 ///
 /// # Errors
 /// [`Error::Io`] where the file cannot be read, [`Error::Parse`] where its content is not what its
-/// format asks for, with the line or byte.
-pub fn read(path: &Path, format: Option<Format>) -> Result<IndexedMesh> {
+/// format asks for, with the line or byte, or has not the weight asked for.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<IndexedMesh> {
     let input = if path == Path::new("-") {
         Input::stdin()
     } else {
         Input::open(path)
     }?;
     input.refuse_stand_ins()?;
-    let format = match format {
+    let format = match options.format {
         Some(format) => format,
         None => input.detect_format()?,
     };
+    let vertex_weight = options.vertex_weight.as_deref();
+    if let Some(property) = vertex_weight.filter(|_| format != Format::Ply) {
+        let found = format!("{format} has no vertex property '{property}'");
+        return Err(input.error(
+            Place::File,
+            &found,
+            "ply, where a vertex weight is asked for",
+        ));
+    }
     match format {
-        Format::Ply => ply::read(input),
+        Format::Ply => ply::read(input, vertex_weight),
         Format::Obj => obj::read(input),
         Format::Stl => stl::read(input),
         Format::Off => off::read(input),

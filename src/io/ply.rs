@@ -10,12 +10,13 @@ use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
 
 use super::input::Input;
-use super::ply_header::{self, CORNERS, Role};
+use super::ply_header::{self, AXES, CORNERS, Role, WEIGHT};
 use super::text::{Lines, parse_number, quote, words};
 
-/// Reads a PLY file: vertices, faces, triangle strips. Other elements and properties are skipped.
-pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
-    let header = ply_header::read(&mut input)?;
+/// Reads a PLY file: vertices, faces, triangle strips, and the vertex property that is asked for as
+/// weight. Other elements and properties are skipped.
+pub(super) fn read(mut input: Input, vertex_weight: Option<&str>) -> Result<IndexedMesh> {
+    let header = ply_header::read(&mut input, vertex_weight)?;
     let vertices = header.vertices();
     let body = match header.encoding {
         Encoding::Ascii => Body::Ascii(Lines::after(input, header.lines)),
@@ -31,6 +32,7 @@ pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
         start: 0,
     };
     let mut builder = MeshBuilder::default();
+    let mut weights = Vec::new();
     let mut corners = Vec::new();
     // Without properties there is nothing to read, so no number of them would ever end the file.
     for def in header
@@ -41,6 +43,10 @@ pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
         let role = Role::of(def);
         for i in 0..def.count {
             let element = reader.next(def, i)?;
+            if let (Role::Vertex { .. }, Some(property)) = (role, vertex_weight) {
+                let weight = element.weight(property);
+                weights.push(single(weight).ok_or_else(|| reader.no_weight(i, weight))?);
+            }
             let outside = |v| reader.outside(def, i, v, vertices);
             match role {
                 Role::Vertex { single: true } => {
@@ -70,7 +76,18 @@ pub(super) fn read(mut input: Input) -> Result<IndexedMesh> {
             }
         }
     }
-    builder.finish()
+    builder.finish()?.with_weights(weights)
+}
+
+/// A weight in single precision, if it is one. Only what was infinite before is so behind, since that
+/// locks.
+fn single(weight: f64) -> Option<f32> {
+    let single = if weight.is_finite() {
+        (weight as f32).min(f32::MAX)
+    } else {
+        weight as f32
+    };
+    (single >= 0.0).then_some(single)
 }
 
 /// A vertex number, if there is such a vertex.
@@ -106,6 +123,7 @@ fn push_strips(builder: &mut MeshBuilder, corners: &[u32]) {
 #[derive(Default)]
 struct Element {
     position: [f64; 3],
+    weight: f64,
     list: Option<Property>,
 }
 
@@ -115,17 +133,18 @@ impl PropertyAccess for Element {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
+        let number = match name {
+            "x" => &mut self.position[0],
+            "y" => &mut self.position[1],
+            "z" => &mut self.position[2],
+            WEIGHT => &mut self.weight,
             CORNERS => {
                 self.list = Some(property);
                 return PropertyAccessResult::Set;
             }
             _ => return PropertyAccessResult::Ignored,
         };
-        self.position[axis] = match property {
+        *number = match property {
             Property::Char(x) => x.into(),
             Property::UChar(x) => x.into(),
             Property::Short(x) => x.into(),
@@ -141,6 +160,12 @@ impl PropertyAccess for Element {
 }
 
 impl Element {
+    /// The weight of a vertex, read from the property of this name in the file.
+    fn weight(&self, property: &str) -> f64 {
+        let axis = AXES.into_iter().position(|axis| axis == property);
+        axis.map_or(self.weight, |axis| self.position[axis])
+    }
+
     /// Fills `corners` from the list of whatever integers, or returns the first that `corner`
     /// refuses.
     fn corners(
@@ -225,9 +250,19 @@ impl ElementReader {
             0 => "vertices in the file".to_string(),
             n => format!("0 to {}", n - 1),
         };
+        self.error(&found, &expected)
+    }
+
+    /// The error for a weight that is none.
+    fn no_weight(&self, i: usize, weight: f64) -> Error {
+        self.error(&format!("vertex {i} has the weight {weight}"), "0 or more")
+    }
+
+    /// An error in the last element.
+    fn error(&self, found: &str, expected: &str) -> Error {
         match &self.body {
-            Body::Ascii(lines) => lines.error(&found, &expected),
-            Body::Binary { input, .. } => input.error(Place::Byte(self.start), &found, &expected),
+            Body::Ascii(lines) => lines.error(found, expected),
+            Body::Binary { input, .. } => input.error(Place::Byte(self.start), found, expected),
         }
     }
 }
@@ -238,7 +273,7 @@ fn parse_line(parser: &Parser<Element>, lines: &Lines, def: &ElementDef) -> Resu
     std::str::from_utf8(lines.line())
         .ok()
         .and_then(parse)
-        .or_else(|| parse(&respell(lines.line())?))
+        .or_else(|| parse_respelled(parse, lines.line()))
         .ok_or_else(|| {
             let names: Vec<_> = def.properties.keys().map(String::as_str).collect();
             let found = format!("{} {}", def.name, quote(lines.line()));
@@ -246,18 +281,34 @@ fn parse_line(parser: &Parser<Element>, lines: &Lines, def: &ElementDef) -> Resu
         })
 }
 
-/// A line with its numbers spelled as ply-rs-bw wants them, which knows neither `1.` nor `.5`, and
-/// no `nan`: what is not finite becomes infinite, which the cleaning drops just as well.
-fn respell(line: &[u8]) -> Option<String> {
+/// Parses a line with numbers that ply-rs-bw does not know. Among them is NaN, which nothing that it
+/// knows can spell: two things stand for it, and a number that differs is NaN.
+fn parse_respelled(parse: impl Fn(&str) -> Option<Element>, line: &[u8]) -> Option<Element> {
+    let (above, below) = (respell(line, "1e999")?, respell(line, "-1e999")?);
+    let mut element = parse(&above)?;
+    if above != below {
+        let other = parse(&below)?;
+        let mark = |x: &mut f64, y: f64| *x = if *x == y { y } else { f64::NAN };
+        for (x, y) in element.position.iter_mut().zip(other.position) {
+            mark(x, y);
+        }
+        mark(&mut element.weight, other.weight);
+    }
+    Some(element)
+}
+
+/// A line with its numbers spelled as ply-rs-bw wants them, which knows neither `1.` nor `.5` nor
+/// `inf`, and with `nan` for NaN.
+fn respell(line: &[u8], nan: &str) -> Option<String> {
     let mut text = String::new();
     for word in words(line) {
-        let x = parse_number(word)?;
-        let finite = if x.is_nan() { f64::INFINITY } else { x };
-        if finite.is_infinite() {
-            text.push_str(if finite < 0.0 { "-1e999 " } else { "1e999 " });
-        } else {
-            text.push_str(&format!("{finite} "));
+        match parse_number(word)? {
+            x if x.is_nan() => text.push_str(nan),
+            f64::INFINITY => text.push_str("1e999"),
+            f64::NEG_INFINITY => text.push_str("-1e999"),
+            x => text.push_str(&x.to_string()),
         }
+        text.push(' ');
     }
     Some(text)
 }
@@ -305,7 +356,11 @@ mod tests {
     use super::*;
 
     fn read_bytes(bytes: impl Into<Vec<u8>>) -> Result<IndexedMesh> {
-        read(Input::from_bytes("a.ply", bytes)?)
+        read(Input::from_bytes("a.ply", bytes)?, None)
+    }
+
+    fn read_weighted(bytes: impl Into<Vec<u8>>, property: &str) -> Result<IndexedMesh> {
+        read(Input::from_bytes("a.ply", bytes)?, Some(property))
     }
 
     fn mesh(bytes: impl Into<Vec<u8>>) -> IndexedMesh {
@@ -323,6 +378,21 @@ mod tests {
 
     fn square() -> IndexedMesh {
         mesh(format!("{HEADER}{BODY}"))
+    }
+
+    /// A small number as a binary file holds it.
+    fn bytes_of(data_type: &str, x: i32, big: bool) -> Vec<u8> {
+        let mut bytes = match data_type {
+            "char" | "uint8" => vec![x as u8],
+            "short" | "uint16" => (x as i16).to_le_bytes().to_vec(),
+            "int" | "uint32" => x.to_le_bytes().to_vec(),
+            "float" => (x as f32).to_le_bytes().to_vec(),
+            _ => f64::from(x).to_le_bytes().to_vec(),
+        };
+        if big {
+            bytes.reverse();
+        }
+        bytes
     }
 
     #[test]
@@ -395,19 +465,6 @@ mod tests {
     /// The square with every type of coordinate, count and index, in both byte orders.
     #[test]
     fn every_type_and_byte_order_reads_the_same() {
-        let bytes_of = |name: &str, x: i32, big: bool| {
-            let mut bytes = match name {
-                "char" | "uint8" => vec![x as u8],
-                "short" | "uint16" => (x as i16).to_le_bytes().to_vec(),
-                "int" | "uint32" => x.to_le_bytes().to_vec(),
-                "float" => (x as f32).to_le_bytes().to_vec(),
-                _ => f64::from(x).to_le_bytes().to_vec(),
-            };
-            if big {
-                bytes.reverse();
-            }
-            bytes
-        };
         let integers = ["char", "uint8", "short", "uint16", "int", "uint32"];
         for big in [false, true] {
             for (coordinate, count, index) in [
@@ -474,6 +531,130 @@ mod tests {
                 .all(|p| (p.x - 5.0e6).abs() < 2.0e-3 && p.x >= 5.0e6)
         );
         assert!((mesh.points().nth(1).unwrap().x - 5000000.001).abs() < 1.0e-8);
+    }
+
+    /// The square with the weights 0 to 3 of every type, as text and in both byte orders, between
+    /// properties that are passed over.
+    #[test]
+    fn weights_of_every_type_and_byte_order_read_the_same() {
+        let weights = [0.0, 1.0, 2.0, 3.0];
+        let types = [
+            "char", "uint8", "short", "uint16", "int", "uint32", "float", "double",
+        ];
+        for data_type in types {
+            let header = HEADER.replace(
+                "float z\n",
+                &format!("float z\nproperty uchar red\nproperty {data_type} w.1\n"),
+            );
+            let mut text = header.clone();
+            for (v, line) in BODY.lines().enumerate() {
+                let more = if v < 4 {
+                    format!(" 7 {v}")
+                } else {
+                    String::new()
+                };
+                text.push_str(&format!("{line}{more}\n"));
+            }
+            let mesh = read_weighted(text, "w.1").unwrap();
+            assert_eq!(mesh.weights(), weights, "{data_type}");
+            for big in [false, true] {
+                let order = if big { "big" } else { "little" };
+                let header = header.replace("ascii", &format!("binary_{order}_endian"));
+                let mut bytes = header.into_bytes();
+                for (v, [x, y]) in [[0, 0], [1, 0], [1, 1], [0, 1]].into_iter().enumerate() {
+                    for coordinate in [x, y, 0] {
+                        bytes.extend(bytes_of("float", coordinate, big));
+                    }
+                    bytes.push(7);
+                    bytes.extend(bytes_of(data_type, v as i32, big));
+                }
+                bytes.push(4);
+                (0..4).for_each(|v| bytes.extend(bytes_of("int", v, big)));
+                let mesh = read_weighted(bytes, "w.1").unwrap();
+                assert_eq!(mesh.weights(), weights, "{data_type} {order}");
+                assert_eq!(mesh.with_weights(Vec::new()).unwrap(), square());
+            }
+        }
+    }
+
+    /// The square with the property `w` behind its coordinates.
+    fn weighted(data_type: &str, weights: [&str; 4]) -> String {
+        let more = format!("float z\nproperty {data_type} w\n");
+        let mut text = HEADER.replace("float z\n", &more);
+        let corners = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
+        for (corner, weight) in corners.into_iter().zip(weights) {
+            text.push_str(&format!("{corner} {weight}\n"));
+        }
+        text + "4 0 1 2 3\n"
+    }
+
+    /// A coordinate can be the weight, and still is a coordinate. A property that is not asked for
+    /// is none, whatever its name.
+    #[test]
+    fn the_weight_is_the_property_asked_for() {
+        let text = weighted("float", ["2", "3", "4", "5"]);
+        let mesh = read_weighted(text.as_str(), "x").unwrap();
+        assert_eq!(mesh.weights(), [0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(mesh.with_weights(Vec::new()).unwrap(), square());
+        assert_eq!(self::mesh(text), square());
+        for other in ["float", "list uchar int"] {
+            let types = format!("{other} {WEIGHT}\nproperty float");
+            let text = weighted(&types, ["0 2", "0 3", "0 4", "0 5"]);
+            let mesh = read_weighted(text, "w").unwrap();
+            assert_eq!(mesh.weights(), [2.0, 3.0, 4.0, 5.0], "{other}");
+        }
+    }
+
+    /// 0 and infinity are weights. A finite double stays finite, since only infinity locks.
+    #[test]
+    fn extreme_weights_are_kept() {
+        let text = weighted("double", ["0", "inf", "1e300", "1e-300"]);
+        let expected = [0.0, f32::INFINITY, f32::MAX, 0.0];
+        assert_eq!(read_weighted(text, "w").unwrap().weights(), expected);
+    }
+
+    #[test]
+    fn a_weight_that_is_none_says_where() {
+        for (weight, written) in [
+            ("-1", "-1"),
+            ("nan", "NaN"),
+            ("-nan(ind)", "NaN"),
+            ("-inf", "-inf"),
+        ] {
+            let error = read_weighted(weighted("float", ["1", "inf", weight, "1"]), "w");
+            let expected =
+                format!("a.ply:13: vertex 2 has the weight {written}; expected 0 or more");
+            assert_eq!(error.unwrap_err().to_string(), expected);
+        }
+        let header = HEADER.replace("ascii", "binary_little_endian");
+        let mut bytes = header.clone().into_bytes();
+        for x in [0.0, 0.0, 1.0, 1.0, 0.0, f32::NAN] {
+            bytes.extend(x.to_le_bytes());
+        }
+        let place = header.len() + 12;
+        assert_eq!(
+            read_weighted(bytes, "z").unwrap_err().to_string(),
+            format!("a.ply: byte {place}: vertex 1 has the weight NaN; expected 0 or more")
+        );
+    }
+
+    #[test]
+    fn a_property_that_can_be_no_weight_is_named() {
+        let text = weighted("list uchar float", ["0"; 4]);
+        for (property, expected) in [
+            (
+                "W",
+                "a.ply: vertex has no property 'W'; expected one of x, y, z, w",
+            ),
+            (
+                "w",
+                "a.ply: vertex property 'w' is a list; expected a number, where it is to be the \
+                 weight",
+            ),
+        ] {
+            let error = read_weighted(text.as_str(), property).unwrap_err();
+            assert_eq!(error.to_string(), expected);
+        }
     }
 
     /// More elements than any memory holds, of no bytes each.

@@ -14,6 +14,11 @@ use super::text::{quote, words};
 
 /// What the list of a face's corners is called here, whichever name it has in the file.
 pub(super) const CORNERS: &str = "vertex_indices";
+/// What the vertex weight is called here, whichever name it has in the file; but a coordinate that
+/// is the weight too keeps its name.
+pub(super) const WEIGHT: &str = "vertex_weight";
+/// The coordinates.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Longer than any header that anyone wrote.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
@@ -60,7 +65,7 @@ impl Role {
         };
         match def.name.as_str() {
             "vertex" => Role::Vertex {
-                single: ["x", "y", "z"].into_iter().all(is_float),
+                single: AXES.into_iter().all(is_float),
             },
             "face" => Role::Face,
             "tristrips" => Role::Strips,
@@ -69,9 +74,9 @@ impl Role {
     }
 }
 
-/// Reads the header and leaves the input behind it.
-pub(super) fn read(input: &mut Input) -> Result<Header> {
-    let tidy = Tidy::read(input)?;
+/// Reads the header and leaves the input behind it. A vertex weight that is asked for is there.
+pub(super) fn read(input: &mut Input, vertex_weight: Option<&str>) -> Result<Header> {
+    let tidy = Tidy::read(input, vertex_weight)?;
     let text = tidy.text.as_bytes();
     let parsed = Parser::<DefaultElement>::new().read_header(&mut Reader::new(text));
     let parsed = parsed.map_err(|e| match e.line() {
@@ -96,6 +101,9 @@ pub(super) fn read(input: &mut Input) -> Result<Header> {
         bytes: tidy.bytes,
     };
     check(&header, input)?;
+    if let Some(property) = vertex_weight {
+        check_weight(&header, property, &tidy.vertex_properties, input)?;
+    }
     Ok(header)
 }
 
@@ -106,7 +114,7 @@ fn check(header: &Header, input: &Input) -> Result<()> {
         let name = &def.name;
         match Role::of(def) {
             Role::Vertex { .. } => {
-                for axis in ["x", "y", "z"] {
+                for axis in AXES {
                     if !def.properties.contains_key(axis) {
                         return fail(format!("{name} has no {axis}"), "properties x, y and z");
                     }
@@ -136,9 +144,38 @@ fn check(header: &Header, input: &Input) -> Result<()> {
     Ok(())
 }
 
+/// The vertices have a number for their weight.
+fn check_weight(header: &Header, property: &str, there: &[String], input: &Input) -> Result<()> {
+    let fail = |found: String, expected: &str| Err(input.error(Place::File, &found, expected));
+    let is_axis = AXES.contains(&property);
+    let name = if is_axis { property } else { WEIGHT };
+    let mut vertices = header.elements.iter().filter(|def| def.name == "vertex");
+    let found = vertices.find_map(|def| def.properties.get(name));
+    match found.map(|p| &p.data_type) {
+        Some(PropertyType::Scalar(_)) => Ok(()),
+        Some(PropertyType::List(..)) => {
+            let found = format!("vertex property '{property}' is a list");
+            fail(found, "a number, where it is to be the weight")
+        }
+        None => {
+            let found = format!("vertex has no property '{property}'");
+            let expected = match there {
+                [] => "vertices with properties".to_string(),
+                there => format!("one of {}", there.join(", ")),
+            };
+            fail(found, &expected)
+        }
+    }
+}
+
 /// A header as ply-rs-bw reads it, line for line.
 #[derive(Default)]
-struct Tidy {
+struct Tidy<'a> {
+    /// The vertex property to call [`WEIGHT`].
+    vertex_weight: Option<&'a str>,
+    /// As the file names them.
+    vertex_properties: Vec<String>,
+    in_vertex: bool,
     text: String,
     lines: usize,
     bytes: u64,
@@ -146,9 +183,12 @@ struct Tidy {
     properties: HashSet<String>,
 }
 
-impl Tidy {
-    fn read(input: &mut Input) -> Result<Tidy> {
-        let mut tidy = Tidy::default();
+impl<'a> Tidy<'a> {
+    fn read(input: &mut Input, vertex_weight: Option<&'a str>) -> Result<Self> {
+        let mut tidy = Tidy {
+            vertex_weight,
+            ..Tidy::default()
+        };
         let mut line = Vec::new();
         let mut lone_cr = false;
         loop {
@@ -204,15 +244,22 @@ impl Tidy {
             [] | ["comment" | "obj_info", ..] => self.text.push_str("comment"),
             ["element", name, count] => {
                 let name = self.unique(name, true);
+                self.in_vertex = name == "vertex";
                 self.properties.clear();
                 self.text.push_str(&format!("element {name} {count}"));
             }
             ["property", types @ .., name] => {
                 let list = types.first() == Some(&"list");
+                let is_weight = self.in_vertex && self.vertex_weight == Some(name);
+                if self.in_vertex {
+                    self.vertex_properties.push(name.to_string());
+                }
                 let name = match *name {
-                    "vertex_index" if list => CORNERS,
                     "x" | "y" | "z" if list => "list",
+                    name if is_weight && !AXES.contains(&name) => WEIGHT,
+                    "vertex_index" if list => CORNERS,
                     CORNERS if !list => "scalar",
+                    WEIGHT => "other",
                     name => name,
                 };
                 let name = self.unique(name, false);

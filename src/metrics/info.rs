@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use crate::clean::{Cleaning, clean};
 use crate::error::Result;
-use crate::indexed_mesh::IndexedMesh;
+use crate::indexed_mesh::{IndexedMesh, Parts};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, Oriented, Outgoing, Small, Tier, VertexId};
 
 /// What is in a mesh, after cleaning but for the first two numbers.
@@ -75,7 +75,11 @@ pub(super) fn info_of_clean(
         .map(|t| t.map(|v| mesh.positions()[v as usize].as_dvec3()))
         .filter(|[a, b, c]| (*b - *a).cross(*c - *a).length_squared() == 0.0)
         .count();
-    let (_, positions, faces, _) = mesh.into_parts();
+    let Parts {
+        positions,
+        triangles: faces,
+        ..
+    } = mesh.into_parts();
     let face_count = faces.len();
     let Oriented {
         mesh,

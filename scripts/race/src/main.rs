@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use decimate::error::Result;
-use decimate::io::{self, WriteOptions};
+use decimate::io::{self, ReadOptions, WriteOptions};
 
 use measure::{Measured, measure};
 
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
 }
 
 fn simplify(mesh: &Path, triangles: usize, output: &Path) -> Result<Measured> {
-    let mut arrays = meshoptimizer::Arrays::from(io::read(mesh, None)?);
+    let mut arrays = meshoptimizer::Arrays::from(io::read(mesh, &ReadOptions::default())?);
     let ((), measured) = measure(|| arrays.simplify_with_update(triangles));
     io::write(output, &arrays.into_mesh()?, &WriteOptions::default())?;
     Ok(measured)

@@ -215,6 +215,9 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         };
         let keep_volume = |factor: &Factor, y: DVec3, trace: f64| {
             let g = self.area_around(surface, e);
+            // The trace is weighted, the normals are not.
+            let [weight_v, weight_w] = ends.map(|v| surface.weight(v));
+            let trace = trace / weight_v.max(weight_w);
             if g.length_squared() > CONSTRAINED * trace * trace {
                 let k = (at_v.area() - at_w.area()).dot(half);
                 let direction = factor.solve(g);
