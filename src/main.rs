@@ -66,7 +66,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
         io::check_place(report)?;
     }
     let options = args.options();
-    options.targets.triangles_of(0)?;
+    options.check()?;
     let write_options = WriteOptions {
         format: args.output_format,
         ascii: args.ascii,

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use decimate::decimate::needed_bytes;
+use decimate::decimate::{Quality, needed_bytes};
 use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{self, ReadOptions, WriteOptions};
 use decimate::mesh::Tier;
@@ -722,7 +722,7 @@ fn a_full_disk_is_an_error() {
 #[test]
 fn a_memory_limit_that_nothing_fits_says_what_is_needed() {
     let folder = Folder::with(&["sample.ply"]);
-    let needed = |tier| needed_bytes(tier, 50_074, 99_969) as f64 / 1e6;
+    let needed = |tier| needed_bytes(Quality::Standard, tier, 50_074, 99_969) as f64 / 1e6;
     let ran = folder.run("sample.ply -o out.ply --ratio 0.1 --memory-limit 1KB");
     ran.failed(
         1,
@@ -736,7 +736,7 @@ fn a_memory_limit_that_nothing_fits_says_what_is_needed() {
 #[test]
 fn auto_takes_the_largest_tier_that_fits_and_says_why() {
     let folder = Folder::with(&["sample.ply"]);
-    let needed = |tier| needed_bytes(tier, 50_074, 99_969);
+    let needed = |tier| needed_bytes(Quality::Standard, tier, 50_074, 99_969);
     for (limit, tier) in [
         ((needed(Tier::Small) + needed(Tier::Medium)) / 2, "small"),
         ((needed(Tier::Medium) + needed(Tier::Full)) / 2, "medium"),

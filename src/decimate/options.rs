@@ -117,6 +117,22 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// Verifies that every number lies in its range.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOptions`] that names the number and what was expected.
+    pub fn check(&self) -> Result<()> {
+        self.targets.triangles_of(0)?;
+        match self.feature_angle_degrees {
+            Some(degrees) if !(0.0..=180.0).contains(&degrees) => Err(Error::InvalidOptions(
+                format!("feature angle {degrees}: an angle of 0 to 180 degrees is expected"),
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
 impl Targets {
     /// The number of triangles to stop at, of `triangles`.
     ///

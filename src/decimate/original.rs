@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::mesh::{EdgeStore, Mesh};
+use super::surface::Surface;
+use crate::mesh::EdgeStore;
 use crate::nearest::Triangles;
 
 /// Faces larger than the mean by this factor squared are sampled in as many rows.
@@ -10,6 +11,9 @@ const ROWS: f64 = 16.0;
 
 /// A small mesh is sampled as if it had this many faces.
 const FEWEST: usize = 10_000;
+
+/// Faces to sample the original in, for each face that is to be left.
+const ON_A_FACE: usize = 2;
 
 /// What a decimated mesh is fitted to: the original's faces and boundary edges, and samples on
 /// both.
@@ -20,6 +24,8 @@ const FEWEST: usize = 10_000;
 pub struct Original {
     pub(super) points: Vec<Vec3>,
     pub(super) weights: Vec<f32>,
+    /// The direction that the surface faces at each sample, roughly; none on the boundary.
+    normals: Vec<[i8; 3]>,
     /// Where the samples of the boundary begin.
     pub(super) boundary_begin: usize,
     pub(super) faces: Triangles,
@@ -30,8 +36,11 @@ pub struct Original {
 }
 
 impl Original {
-    /// Samples a mesh: one and a half a face of about mean size. Needs 165 bytes a triangle.
-    pub fn new<S: EdgeStore>(mesh: &Mesh<S>, positions: &[Vec3], with_boundary: bool) -> Self {
+    /// Samples a surface, so that some fall on each of `target` faces: one and a half a face of about
+    /// mean size, at least. Needs 150 bytes a triangle.
+    pub fn new<S: EdgeStore>(surface: &Surface<S>, target: usize, with_boundary: bool) -> Self {
+        let (mesh, positions) = (&surface.mesh, surface.geometry.positions());
+        let scale = surface.geometry.scale();
         let corners: Vec<[DVec3; 3]> = mesh
             .faces()
             .map(|f| {
@@ -41,23 +50,33 @@ impl Original {
             .collect();
         let area = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).length() / 2.0;
         let total: f64 = corners.iter().map(area).sum();
-        let typical = total / corners.len().max(FEWEST) as f64;
+        let faces = corners.len().max(FEWEST).max(ON_A_FACE * target);
+        let typical = total / faces as f64;
         let mut points = positions.to_vec();
         let mut weights = vec![0.0f32; points.len()];
+        let mut normals = vec![DVec3::ZERO; points.len()];
+        let mut face_normals = Vec::with_capacity(corners.len());
         for (f, triangle) in mesh.faces().zip(&corners) {
             let area = area(triangle);
             let rows = (area / typical).sqrt().round().clamp(1.0, ROWS);
+            let area = area * scale * scale;
             let at_corner = area / (12.0 * rows);
+            let [a, b, c] = triangle.map(|p| p * scale);
+            let normal = (b - a).cross(c - a);
             for v in mesh.face_vertices(f) {
                 weights[v.index()] += at_corner as f32;
+                normals[v.index()] += normal;
             }
             let weight = (area - 3.0 * at_corner) / (rows * rows);
             for point in centroids(triangle, rows as usize) {
                 points.push(point.as_vec3());
                 weights.push(weight as f32);
+                face_normals.push(pack(normal));
             }
         }
         let boundary_begin = points.len();
+        let mut normals: Vec<[i8; 3]> = normals.into_iter().map(pack).collect();
+        normals.extend(face_normals);
         let mut edges = Vec::new();
         if with_boundary {
             for e in mesh.edges().filter(|&e| mesh.is_boundary(e)) {
@@ -67,11 +86,14 @@ impl Original {
                 let length = a.distance(b);
                 for (point, share) in [(a, 1.0 / 6.0), ((a + b) / 2.0, 2.0 / 3.0), (b, 1.0 / 6.0)] {
                     points.push(point.as_vec3());
-                    weights.push((length * share) as f32);
+                    weights.push((length * scale * share) as f32);
                 }
                 edges.push([a, b, b]);
             }
         }
+        points.shrink_to_fit();
+        weights.shrink_to_fit();
+        normals.shrink_to_fit();
         let largest = positions
             .iter()
             .fold(0.0f32, |m, p| m.max(p.abs().max_element()));
@@ -79,6 +101,7 @@ impl Original {
         Self {
             points,
             weights,
+            normals,
             boundary_begin,
             faces: Triangles::new(corners),
             boundary: Triangles::new(edges),
@@ -86,13 +109,28 @@ impl Original {
         }
     }
 
+    /// Whether the surface faces the same way at a sample as a triangle does: the other side of a
+    /// thin sheet is near, but nothing to be fitted to.
+    pub(super) fn faces_as(&self, sample: usize, &[a, b, c]: &[DVec3; 3]) -> bool {
+        let [x, y, z] = self.normals[sample].map(f64::from);
+        (b - a).cross(c - a).dot(DVec3::new(x, y, z)) >= 0.0
+    }
+
     /// The bytes held.
     pub fn bytes(&self) -> usize {
         self.points.capacity() * size_of::<Vec3>()
             + self.weights.capacity() * size_of::<f32>()
+            + self.normals.capacity() * size_of::<[i8; 3]>()
             + self.faces.bytes()
             + self.boundary.bytes()
     }
+}
+
+/// A direction to a hundredth.
+fn pack(normal: DVec3) -> [i8; 3] {
+    (normal.normalize_or_zero() * 127.0)
+        .to_array()
+        .map(|x| x as i8)
 }
 
 /// The centroids of the triangles that so many rows cut one into.

@@ -197,7 +197,7 @@ impl Triangles {
     ///
     /// # Panics
     /// Where there are more than 2³¹ triangles or a coordinate is not finite.
-    pub fn new(triangles: Vec<[DVec3; 3]>) -> Self {
+    pub fn new(mut triangles: Vec<[DVec3; 3]>) -> Self {
         assert!(triangles.len() < 1 << 31, "too many triangles");
         assert!(
             triangles.iter().flatten().all(|p| p.is_finite()),
@@ -215,10 +215,12 @@ impl Triangles {
         if !items.is_empty() {
             subtree(&mut items, 0, &mut nodes);
         }
+        nodes.shrink_to_fit();
         let names: Vec<u32> = items.iter().map(|item| item.name).collect();
-        let corners = names.iter().map(|&name| triangles[name as usize]).collect();
+        drop(items);
+        put_in_order(&mut triangles, &names);
         Self {
-            corners,
+            corners: triangles,
             names,
             nodes,
             unit,
@@ -387,6 +389,24 @@ impl Triangles {
                 .below(n)
                 .fold(Bounds::EMPTY, |all, (_, bounds)| all.with(bounds)),
             Place::Triangle(slot) => self.unit.bounds(&self.corners[slot as usize]),
+        }
+    }
+}
+
+/// Puts what `names` names in the `i`-th place into the `i`-th place.
+fn put_in_order(triangles: &mut [[DVec3; 3]], names: &[u32]) {
+    let mut is_done = vec![false; names.len()];
+    for start in 0..names.len() {
+        let first = triangles[start];
+        let mut at = start;
+        while !std::mem::replace(&mut is_done[at], true) {
+            let from = names[at] as usize;
+            triangles[at] = if from == start {
+                first
+            } else {
+                triangles[from]
+            };
+            at = from;
         }
     }
 }
