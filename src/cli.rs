@@ -215,7 +215,7 @@ pub enum TopologyArg {
     /// Keep components, boundary loops and handles
     #[default]
     Preserve,
-    /// Let tiny components vanish, pockets fall flat, gaps and holes close, cheapest first
+    /// Let tiny components vanish, pockets fall flat, gaps close, handles go, cheapest first
     Simplify,
 }
 

@@ -1064,3 +1064,51 @@ fn help_says_what_ratio_and_max_error_mean() {
     let expected = format!("decimate {}\n", env!("CARGO_PKG_VERSION"));
     assert_eq!(String::from_utf8(version.stdout).unwrap(), expected);
 }
+
+/// Each value of the options that choose a surface is taken, and does something.
+#[test]
+fn surface_options_are_accepted() {
+    let folder = Folder::with(&["sample.ply"]);
+    folder.run("sample.ply -o standard.ply --ratio 0.05");
+    for arguments in [
+        "--quality fast",
+        "--quality best",
+        "--topology simplify",
+        "--feature-angle 30",
+    ] {
+        let ran = folder.run(&format!("sample.ply -o out.ply --ratio 0.05 {arguments}"));
+        assert_eq!(ran.status, 0, "{arguments}: {}", ran.stderr);
+        let triangles = folder.mesh("out.ply").triangle_count();
+        assert!(
+            (4996..=4998).contains(&triangles),
+            "{arguments}: {triangles}"
+        );
+        let is_standard = folder.bytes("out.ply") == folder.bytes("standard.ply");
+        // The sample has nothing that topology stands in the way of.
+        assert_eq!(
+            is_standard,
+            arguments == "--topology simplify",
+            "{arguments}"
+        );
+    }
+    folder.run("sample.ply -o out.ply --ratio 0.05 --quality standard --topology preserve");
+    assert!(folder.bytes("out.ply") == folder.bytes("standard.ply"));
+}
+
+/// The message names the flag, so that it is found in a long line.
+#[test]
+fn wrong_surface_options_are_named() {
+    let folder = Folder::with_hill();
+    for (flag, value) in [
+        ("--quality", "worst"),
+        ("--topology", "destroy"),
+        ("--feature-angle", "sharp"),
+        ("--feature-angle", "-5"),
+        ("--feature-angle", "720"),
+        ("--feature-angle", "nan"),
+    ] {
+        let arguments = format!("hill.ply -o out.ply --ratio 0.5 {flag} {value}");
+        folder.run(&arguments).failed(2, flag);
+    }
+    assert!(!folder.names().contains("out.ply"));
+}

@@ -1,11 +1,11 @@
 //! What decimation reaches on surfaces that are known: counts exact, distances at most so much, the
 //! same in every tier. A bound that could be a third of itself is reported.
 
-use decimate::decimate::{Options, Targets, TierChoice, decimate};
+use decimate::decimate::{Options, Quality, Targets, TierChoice, decimate};
 use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{self, ReadOptions};
 use decimate::mesh::Tier;
-use decimate::metrics::{CompareOptions, Comparison, Reference};
+use decimate::metrics::{CompareOptions, Distances, Reference};
 use glam::Vec3;
 
 /// A surface over a grid of parameters in [0, 1)², closed in the directions that wrap.
@@ -77,25 +77,46 @@ fn cube(n: u32) -> IndexedMesh {
     IndexedMesh::new(positions, triangles).unwrap()
 }
 
-struct Case {
-    name: &'static str,
-    mesh: IndexedMesh,
-    /// Triangles asked for, and got.
-    asked: usize,
+/// What a quality reaches.
+struct Golden {
+    quality: Quality,
+    /// Triangles got.
     got: usize,
     /// Upper bounds, of the diagonal.
     rms: f64,
     hausdorff: f64,
 }
 
+struct Case {
+    name: &'static str,
+    mesh: IndexedMesh,
+    /// Triangles asked for.
+    asked: usize,
+    golden: [Golden; 3],
+}
+
+/// Nothing but rounding.
+const EXACT: [f64; 2] = [1e-12, 1e-12];
+
 fn cases() -> Vec<Case> {
-    let case = |name, mesh, asked, got, rms, hausdorff| Case {
-        name,
-        mesh,
-        asked,
-        got,
-        rms,
-        hausdorff,
+    // For each quality the count, and the bounds on rms and Hausdorff distance.
+    let case = |name, mesh, asked, golden: [(usize, [f64; 2]); 3]| {
+        let qualities = [Quality::Fast, Quality::Standard, Quality::Best];
+        let golden = [0, 1, 2].map(|i| {
+            let (got, [rms, hausdorff]) = golden[i];
+            Golden {
+                quality: qualities[i],
+                got,
+                rms,
+                hausdorff,
+            }
+        });
+        Case {
+            name,
+            mesh,
+            asked,
+            golden,
+        }
     };
     // n equilateral triangles fitted to a sphere leave 0.2705/n of the diagonal in rms.
     let limit = 0.2705 / 2000.0;
@@ -112,82 +133,112 @@ fn cases() -> Vec<Case> {
         [u, v, waves]
     });
     let sample = io::read("data/sample.ply".as_ref(), &ReadOptions::default()).unwrap();
+    let round = |rms: f64, hausdorff| (2000, [rms * limit, hausdorff]);
     vec![
         case(
             "sphere",
             sphere(64, [1.0; 3]),
             2000,
-            2000,
-            1.4 * limit,
-            1.25e-3,
+            [round(9.0, 1.0), round(1.4, 1.25e-3), round(9.0, 1.0)],
         ),
         case(
             "ellipsoid",
             sphere(64, [3.0, 2.0, 1.0]),
             2000,
-            2000,
-            1.42e-4,
-            1.25e-3,
+            [
+                (2000, [1.0, 1.0]),
+                (2000, [1.42e-4, 1.25e-3]),
+                (2000, [1.0, 1.0]),
+            ],
         ),
-        case("torus", torus, 1200, 1200, 4.5e-4, 2.7e-3),
-        case("cylinder with open rims", cylinder, 192, 192, 1e-12, 1e-12),
-        case("height field", field, 1500, 1499, 1.57e-4, 1.5e-3),
-        case("cube grid", cube(24), 12, 12, 1e-12, 1e-12),
-        case("sample", sample, 9996, 9996, 8.9e-5, 2.2e-3),
+        case(
+            "torus",
+            torus,
+            1200,
+            [
+                (1200, [1.0, 1.0]),
+                (1200, [4.5e-4, 2.7e-3]),
+                (1200, [1.0, 1.0]),
+            ],
+        ),
+        case("cylinder with open rims", cylinder, 192, [(192, EXACT); 3]),
+        case(
+            "height field",
+            field,
+            1500,
+            [
+                (1500, [1.0, 1.0]),
+                (1500, [1.57e-4, 1.5e-3]),
+                (1500, [1.0, 1.0]),
+            ],
+        ),
+        case("cube grid", cube(24), 12, [(12, EXACT); 3]),
+        case(
+            "sample",
+            sample,
+            9996,
+            [
+                (9996, [1.0, 1.0]),
+                (9996, [8.9e-5, 2.2e-3]),
+                (9996, [1.0, 1.0]),
+            ],
+        ),
     ]
 }
 
-fn run(case: &Case, reference: &Reference, tier: Tier) -> (IndexedMesh, Comparison) {
+fn run(case: &Case, quality: Quality, tier: Tier) -> IndexedMesh {
     let targets = Targets {
         triangles: Some(case.asked),
         ..Targets::default()
     };
     let options = Options {
         targets,
+        quality,
         tier: TierChoice::Fixed(tier),
         ..Options::default()
     };
-    let (small, _) = decimate(case.mesh.clone(), &options).unwrap();
+    decimate(case.mesh.clone(), &options).unwrap().0
+}
+
+fn distances(case: &Case, reference: &Reference, small: IndexedMesh) -> Distances {
     let measure = CompareOptions {
         samples: 100_000,
         intersections: false,
     };
-    let comparison = reference.compare(small.clone(), &measure).unwrap();
-    (small, comparison)
+    let c = reference.compare(small, &measure).unwrap();
+    let new = (c.new_boundary_edges, c.new_non_manifold_edges);
+    assert_eq!(new, (0, 0), "{}", case.name);
+    c.surface.two_sided_of_diagonal
 }
 
 #[test]
-fn known_surfaces_keep_their_bounds_in_every_tier() {
+fn known_surfaces_keep_their_bounds_in_every_quality_and_tier() {
     let mut failures = Vec::new();
     for case in cases() {
         let reference = Reference::new(case.mesh.clone()).unwrap();
-        let (small, c) = run(&case, &reference, Tier::Full);
-        for tier in [Tier::Medium, Tier::Small] {
-            assert_eq!(
-                run(&case, &reference, tier).0,
-                small,
-                "{}: {tier:?}",
-                case.name
-            );
-        }
-        assert_eq!(small.triangle_count(), case.got, "{}", case.name);
-        assert_eq!(
-            (c.new_boundary_edges, c.new_non_manifold_edges),
-            (0, 0),
-            "{}",
-            case.name
-        );
-        let reached = c.surface.two_sided_of_diagonal;
-        for (what, x, bound) in [
-            ("rms", reached.rms, case.rms),
-            ("Hausdorff", reached.max, case.hausdorff),
-        ] {
-            println!("{}: {what} {x:.4e}, at most {bound:.4e}", case.name);
-            if x > bound {
-                failures.push(format!("{}: {what} {x:e} is over {bound:e}", case.name));
+        for golden in &case.golden {
+            let name = format!("{}, {:?}", case.name, golden.quality);
+            let small = run(&case, golden.quality, Tier::Full);
+            for tier in [Tier::Medium, Tier::Small] {
+                let other = run(&case, golden.quality, tier);
+                assert!(other == small, "{name}: {tier:?} differs");
             }
-            if 3.0 * x < bound && bound > 1e-7 {
-                println!("{}: the bound on {what} can be tightened", case.name);
+            let got = small.triangle_count();
+            if got != golden.got {
+                failures.push(format!("{name}: {got} triangles, not {}", golden.got));
+            }
+            let reached = distances(&case, &reference, small);
+            for (what, x, bound) in [
+                ("rms", reached.rms, golden.rms),
+                ("Hausdorff", reached.max, golden.hausdorff),
+            ] {
+                println!("{name}: {what} {x:.4e}, at most {bound:.4e}");
+                if x > bound {
+                    failures.push(format!("{name}: {what} {x:e} is over {bound:e}"));
+                }
+                if 3.0 * x < bound && bound > 1e-7 {
+                    println!("{name}: the bound on {what} can be tightened");
+                }
             }
         }
     }

@@ -68,6 +68,9 @@ pub struct Greedy<'a, S, C, Q> {
     topology: Topology,
     /// What may be removed, the cheapest last; nothing where the topology stays.
     components: Vec<Component>,
+    /// Dead slots, to be used again where a pinch needs some.
+    free_faces: Vec<FaceId>,
+    free_vertices: Vec<VertexId>,
     tally: Tally,
 }
 
@@ -92,6 +95,8 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 Topology::Simplify => removable(surface),
             },
             surface,
+            free_faces: Vec::new(),
+            free_vertices: Vec::new(),
             tally,
         };
         greedy.tally.rejected_lock = greedy.locked_edges();
@@ -169,7 +174,10 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 continue;
             }
             match self.way(e, position) {
-                Err(Rejection::Link) => self.tally.rejected_link += 1,
+                Err(Rejection::Link) => {
+                    self.tally.rejected_link += 1;
+                    self.pinch(&candidate, &mut changed);
+                }
                 Err(Rejection::Flip) => self.tally.rejected_flip += 1,
                 Err(Rejection::Error) => self.tally.rejected_error += 1,
                 Ok(way) => {
@@ -293,6 +301,69 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
     }
 
+    /// Where a handle stands in the way of a candidate, pinches it off if that costs no more than the
+    /// candidate does; else the candidate waits until its turn comes at that price.
+    fn pinch(&mut self, candidate: &Candidate, changed: &mut Vec<VertexId>) {
+        let is_allowed = self.topology == Topology::Simplify
+            && self.surface.creases.is_empty()
+            && self.cost.moves_vertices();
+        let (2.., 3..) = (self.free_faces.len(), self.free_vertices.len()) else {
+            return;
+        };
+        if !is_allowed {
+            return;
+        }
+        let mesh = &self.surface.mesh;
+        let is_free =
+            |edges: &&[EdgeId; 3]| !edges.iter().any(|&e| self.surface.is_locked(mesh.tail(e)));
+        let loops = mesh.open_loops(candidate.edge);
+        let prices = loops.iter().filter(is_free);
+        let Some((price, &edges)) = prices
+            .map(|edges| (self.surface.pinch_price(edges) as f32, edges))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+        else {
+            return;
+        };
+        let longest_side = |e: EdgeId| {
+            let [a, b] = mesh.edge_vertices(e);
+            self.surface.geometry.between(a, b).length()
+        };
+        let reach = edges.map(longest_side).into_iter().fold(0.0, f64::max);
+        if self.stop.max_error.is_some_and(|limit| reach > limit) {
+            return;
+        }
+        if price > candidate.cost {
+            let waiting = Candidate {
+                cost: price,
+                evaluated_at: self.tally.collapses as u32,
+                ..*candidate
+            };
+            self.queue.push(waiting);
+            return;
+        }
+        if !mesh.is_around_handle(&edges) {
+            return;
+        }
+        let tails = edges.map(|e| mesh.tail(e));
+        let [.., a, b] = self.free_faces[..] else {
+            return;
+        };
+        let [.., x, y, z] = self.free_vertices[..] else {
+            return;
+        };
+        if self.surface.pinch(&edges, [a, b], [x, y, z]).is_none() {
+            return;
+        }
+        self.free_faces.truncate(self.free_faces.len() - 2);
+        self.free_vertices.truncate(self.free_vertices.len() - 3);
+        self.surface.lost = self.surface.lost.max(reach);
+        self.triangles += 2;
+        self.tally.pinched_handles += 1;
+        let cut = [[tails[0], x], [tails[1], y], [tails[2], z]];
+        self.cost.after_pinch(self.surface, cut, changed);
+        self.reconsider(changed);
+    }
+
     fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way) -> Merged {
         let mesh = &self.surface.mesh;
         let ends = mesh.edge_vertices(e);
@@ -308,6 +379,10 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         };
         self.tally.contractions += usize::from(contraction.is_some());
         let merged = self.surface.collapse(e, position, contraction);
+        if self.topology == Topology::Simplify {
+            self.free_faces.extend(&merged.collapse.dead_faces);
+            self.free_vertices.push(merged.collapse.removed);
+        }
         let dead = merged.collapse.dead_faces.iter();
         self.triangles -= dead.map(|&f| self.surface.sides(f)).sum::<usize>();
         self.tally.collapses += 1;

@@ -141,22 +141,21 @@ fn run<S: EdgeStore>(
         double_sided,
         weights,
     } = input.into_parts();
-    let Oriented {
-        mesh, mut flipped, ..
-    } = Mesh::<S>::oriented(positions.len(), triangles);
+    let Oriented { mesh, flipped, .. } = Mesh::<S>::oriented(positions.len(), triangles);
     let mut surface = Surface {
         locked: Vec::new(),
         creases: Vec::new(),
         weights: Vec::new(),
         deviation: vec![0.0; mesh.vertex_slots()],
         lost: 0.0,
+        turned: flipped,
         geometry: Geometry::new(positions, diagonal),
         mesh,
         double_sided,
     };
     report.mesh_bytes = surface.mesh_bytes();
     report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
-    report.reoriented_faces = flipped.iter().filter(|&&f| f).count();
+    report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
     report.build_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
@@ -211,16 +210,17 @@ fn run<S: EdgeStore>(
         mut mesh,
         geometry,
         mut double_sided,
+        mut turned,
         ..
     } = surface;
     let map = mesh.compact();
     let mut positions = geometry.into_positions();
     Compaction::retain(&map.vertices, &mut positions);
     Compaction::retain(&map.faces, &mut double_sided);
-    Compaction::retain(&map.faces, &mut flipped);
+    Compaction::retain(&map.faces, &mut turned);
     let mut triangles = mesh.triangles();
     drop(mesh);
-    turn_round(&mut triangles, &flipped);
+    turn_round(&mut triangles, &turned);
     report.vertices_out = positions.len();
     let output =
         IndexedMesh::with_origin(origin, positions, triangles)?.with_double_sided(double_sided)?;

@@ -48,7 +48,7 @@ pub enum Topology {
     /// It stays: components, boundary loops, handles, non-manifold curves, enclosed pockets.
     #[default]
     Preserve,
-    /// Components may vanish, pockets fall flat, gaps and holes close: each for what it costs in area
+    /// Components may vanish, pockets fall flat, gaps and holes close, handles be pinched off: each for what it costs in area
     /// and distance, the cheapest first. Nothing tears and nothing non-manifold is born.
     Simplify,
 }

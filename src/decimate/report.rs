@@ -43,6 +43,8 @@ pub struct Tally {
     pub collapses_non_manifold: usize,
     /// Collapses, of these, that changed the topology, where that was allowed.
     pub contractions: usize,
+    /// Handles pinched, where that was allowed.
+    pub pinched_handles: usize,
     /// Components removed, where that was allowed.
     pub removed_components: usize,
     /// Refusals because the topology would have changed.

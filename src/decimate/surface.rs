@@ -1,6 +1,6 @@
 //! A mesh being decimated: connectivity, geometry and what is carried along.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 
 use super::geometry::Geometry;
@@ -27,6 +27,8 @@ pub struct Surface<S> {
     pub locked: Vec<bool>,
     /// One flag a face that counts as two, or nothing where none does.
     pub double_sided: Vec<bool>,
+    /// One flag a face that was turned round to agree with its neighbours, or nothing where none was.
+    pub turned: Vec<bool>,
     /// One flag a directed edge that is kept as part of a curve, or nothing where none is.
     pub creases: Vec<bool>,
     /// What the cost is multiplied by around each vertex, or nothing where by 1.
@@ -223,6 +225,68 @@ impl<S: EdgeStore> Surface<S> {
             from,
             around,
         }
+    }
+
+    /// What pinching the loop costs: the two caps' area times the squared length of the longest side,
+    /// as if all of both were that far from the original.
+    pub fn pinch_price(&self, edges: &[EdgeId; 3]) -> f64 {
+        let [a, b, c] = edges.map(|e| self.geometry.vector(Vec3::ZERO, self.mesh.tail(e)));
+        let longest = (b - a)
+            .length_squared()
+            .max((c - b).length_squared())
+            .max((a - c).length_squared());
+        (b - a).cross(c - a).length() * longest
+    }
+
+    /// Cuts along a loop and caps both sides; the right one takes the dead `caps` and `vertices`, a
+    /// thousandth of the way to its neighbours, so that both sides stay apart in a file. Nothing
+    /// where single precision cannot tell them apart.
+    pub fn pinch(
+        &mut self,
+        edges: &[EdgeId; 3],
+        caps: [FaceId; 2],
+        vertices: [VertexId; 3],
+    ) -> Option<()> {
+        const APART: f64 = 1e-3;
+        let tails = edges.map(|e| self.mesh.tail(e));
+        let mut places = [Vec3::ZERO; 3];
+        for i in 0..3 {
+            let here = self.geometry.position(tails[i]);
+            let end = edges[i];
+            let mut at = self.mesh.mate(edges[(i + 2) % 3]);
+            let (mut sum, mut count) = (DVec3::ZERO, 0);
+            while let Some(e) = at.filter(|&e| e != end) {
+                sum += self.geometry.position(self.mesh.apex(e)).as_dvec3();
+                count += 1;
+                at = self.mesh.mate(self.mesh.prev(e));
+            }
+            let mean = sum / f64::from(count);
+            places[i] = (here.as_dvec3() + (mean - here.as_dvec3()) * APART).as_vec3();
+            if places[i] == here || !places[i].is_finite() {
+                return None;
+            }
+        }
+        self.mesh.pinch(edges, caps, vertices);
+        let turned = self.turned.get(edges[0].face().index()) == Some(&true);
+        for cap in caps {
+            if let Some(flag) = self.turned.get_mut(cap.index()) {
+                *flag = turned;
+            }
+            if let Some(double) = self.double_sided.get_mut(cap.index()) {
+                *double = false;
+            }
+        }
+        for ((old, new), place) in tails.into_iter().zip(vertices).zip(places) {
+            self.geometry.set_position(new, place);
+            self.deviation[new.index()] = self.deviation[old.index()];
+            if !self.weights.is_empty() {
+                self.weights[new.index()] = self.weights[old.index()];
+            }
+            if let Some(locked) = self.locked.get_mut(new.index()) {
+                *locked = false;
+            }
+        }
+        Some(())
     }
 
     /// Flips `e`, with the creases around it.

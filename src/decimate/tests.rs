@@ -1,11 +1,15 @@
 //! What decimation promises, on shapes small enough to know the answer.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::for_each_tier;
-use crate::metrics::info;
+use crate::indexed_mesh::MeshBuilder;
+use crate::metrics::{CompareOptions, Comparison, compare, info};
+use crate::nearest::Triangles;
 use crate::shapes::{self, Shape};
+
+const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Standard, Quality::Best];
 
 fn mesh((positions, triangles): Shape) -> IndexedMesh {
     IndexedMesh::new(positions, triangles).unwrap()
@@ -43,6 +47,42 @@ fn to_error(max_error: f64) -> Options {
 
 fn run_in<S: EdgeStore>(shape: Shape, options: Options) -> (IndexedMesh, Report) {
     decimate(mesh(shape), &tiered::<S>(options)).unwrap()
+}
+
+/// [`to_triangles`], in a quality.
+fn to_triangles_in(quality: Quality, triangles: usize) -> Options {
+    Options {
+        quality,
+        ..to_triangles(triangles)
+    }
+}
+
+/// How far a result is from its original.
+fn measured(original: &IndexedMesh, small: &IndexedMesh) -> Comparison {
+    let few = CompareOptions {
+        samples: 100_000,
+        intersections: false,
+    };
+    compare(original.clone(), small.clone(), &few).unwrap()
+}
+
+/// The distance of the farthest vertex from another mesh's faces, in model units.
+fn farthest_vertex(of: &IndexedMesh, from: &IndexedMesh) -> f64 {
+    let points: Vec<DVec3> = from.points().collect();
+    let corners = from.triangles().iter();
+    let faces = Triangles::new(corners.map(|t| t.map(|v| points[v as usize])).collect());
+    let squared = |p| faces.nearest(p).unwrap().distance_squared;
+    of.points().map(squared).fold(0.0, f64::max).sqrt()
+}
+
+/// The volume that a closed mesh encloses.
+fn volume(mesh: &IndexedMesh) -> f64 {
+    let points: Vec<DVec3> = mesh.points().collect();
+    let corners = mesh
+        .triangles()
+        .iter()
+        .map(|t| t.map(|v| points[v as usize]));
+    corners.map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0
 }
 
 /// A bumpy height field over the unit square: nothing on it is flat.
@@ -84,20 +124,19 @@ fn wall(n: u32, m: u32) -> Shape {
 }
 
 /// A subdivided cube comes down to its eight corners, exactly: flat walls and straight edges cost
-/// nothing.
+/// nothing, in every quality.
 fn a_cube_comes_down_to_its_corners<S: EdgeStore>() {
-    let (small, report) = run_in::<S>(cube(4), to_triangles(12));
-    assert_eq!((report.triangles_out, report.vertices_out), (12, 8));
-    assert!(
-        report.max_error_estimate < 1e-7,
-        "{}",
-        report.max_error_estimate
-    );
-    for p in small.positions() {
-        assert!(
-            p.to_array().iter().all(|&c| c == 0.0 || c == 1.0),
-            "{p} is no corner"
-        );
+    for quality in QUALITIES {
+        let (small, report) = run_in::<S>(cube(4), to_triangles_in(quality, 12));
+        assert_eq!((report.triangles_out, report.vertices_out), (12, 8));
+        let estimate = report.max_error_estimate;
+        assert!(estimate < 1e-7, "{quality:?}: {estimate}");
+        for p in small.positions() {
+            assert!(
+                p.to_array().iter().all(|&c| c == 0.0 || c == 1.0),
+                "{quality:?}: {p} is no corner"
+            );
+        }
     }
 }
 
@@ -107,52 +146,59 @@ fn a_turned_cube_comes_down_to_its_corners<S: EdgeStore>() {
     let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
     let corners: Vec<Vec3> = positions[..8].iter().map(|&p| turn * p).collect();
     positions.iter_mut().for_each(|p| *p = turn * *p);
-    let (small, report) = run_in::<S>((positions, triangles), to_triangles(12));
-    assert_eq!(report.triangles_out, 12);
-    for p in small.positions() {
-        let nearest = corners
-            .iter()
-            .map(|c| c.distance(*p))
-            .fold(f32::MAX, f32::min);
-        assert!(nearest < 1e-6, "{p} is {nearest} from a corner");
+    for quality in QUALITIES {
+        let shape = (positions.clone(), triangles.clone());
+        let (small, report) = run_in::<S>(shape.clone(), to_triangles_in(quality, 12));
+        assert_eq!(report.triangles_out, 12);
+        for p in small.positions() {
+            let distances = corners.iter().map(|c| c.distance(*p));
+            let nearest = distances.fold(f32::MAX, f32::min);
+            assert!(
+                nearest < 1e-6,
+                "{quality:?}: {p} is {nearest} from a corner"
+            );
+        }
+        let largest = measured(&mesh(shape), &small)
+            .surface
+            .two_sided_of_diagonal
+            .max;
+        assert!(largest < 1e-7, "{quality:?}: {largest}");
     }
 }
 
 /// A wall loses its rings and keeps its rims: 12 sides leave 24 triangles over the 24 rim vertices.
 fn a_wall_comes_down_to_its_rims<S: EdgeStore>() {
     let shape = wall(12, 10);
-    let rims: Vec<Vec3> = shape
-        .0
-        .iter()
-        .filter(|p| p.z == 0.0 || p.z == 1.0)
-        .copied()
-        .collect();
-    let (small, report) = run_in::<S>(shape, to_triangles(24));
-    assert_eq!((report.triangles_out, report.vertices_out), (24, 24));
-    assert!(small.positions().iter().all(|p| rims.contains(p)));
+    let is_on_rim = |p: &&Vec3| p.z == 0.0 || p.z == 1.0;
+    let rims: Vec<Vec3> = shape.0.iter().filter(is_on_rim).copied().collect();
+    for quality in QUALITIES {
+        let (small, report) = run_in::<S>(shape.clone(), to_triangles_in(quality, 24));
+        assert_eq!((report.triangles_out, report.vertices_out), (24, 24));
+        assert!(
+            small.positions().iter().all(|p| rims.contains(p)),
+            "{quality:?}: a vertex left the rims"
+        );
+        let c = measured(&mesh(shape.clone()), &small);
+        let boundary = c.boundary.unwrap().two_sided_of_diagonal.max;
+        let largest = c.surface.two_sided_of_diagonal.max.max(boundary);
+        assert!(largest < 1e-7, "{quality:?}: {largest}");
+    }
 }
 
 /// A flat sheet of 10 000 triangles becomes two.
 fn a_flat_sheet_becomes_two_triangles<S: EdgeStore>() {
-    let options = Options {
-        check: false,
-        ..to_triangles(2)
-    };
-    let options = Options {
-        tier: TierChoice::Fixed(S::TIER),
-        ..options
-    };
-    let (small, report) = decimate(mesh(shapes::grid(71, 71)), &options).unwrap();
-    assert_eq!(report.triangles_out, 2);
-    let area: f32 = small
-        .triangles()
-        .iter()
-        .map(|t| {
-            let [a, b, c] = t.map(|v| small.positions()[v as usize]);
-            (b - a).cross(c - a).z / 2.0
-        })
-        .sum();
-    assert!((area - 1.0).abs() < 1e-6, "area {area}");
+    for quality in QUALITIES {
+        let options = Options {
+            tier: TierChoice::Fixed(S::TIER),
+            ..to_triangles_in(quality, 2)
+        };
+        let (small, report) = decimate(mesh(shapes::grid(71, 71)), &options).unwrap();
+        assert_eq!(report.triangles_out, 2, "{quality:?}");
+        let at = |v: u32| small.positions()[v as usize];
+        let doubled = |t: &[u32; 3]| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).z;
+        let area = small.triangles().iter().map(doubled).sum::<f32>() / 2.0;
+        assert!((area - 1.0).abs() < 1e-6, "{quality:?}: area {area}");
+    }
 }
 
 /// Each target stops where it should, and never more than one collapse below.
@@ -264,7 +310,7 @@ fn an_infinite_weight_keeps_the_bits<S: EdgeStore>() {
     };
     let before = weighted(16, weigh);
     assert_eq!(kept(&before).len(), 17 + 2);
-    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+    for quality in QUALITIES {
         for boundary in [Boundary::Keep, Boundary::Lock] {
             let options = tiered::<S>(Options {
                 quality,
@@ -294,7 +340,7 @@ fn a_heavy_half_keeps_more<S: EdgeStore>() {
         };
         small.triangles().iter().filter(|t| sum_x(t) < 1.5).count()
     };
-    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+    for quality in QUALITIES {
         let (even, heavy) = (left(1.0, quality), left(100.0, quality));
         assert!((80..120).contains(&even), "{quality:?}: {even} of 200");
         assert!(heavy > 150, "{quality:?}: {heavy} of 200, {even} evenly");
@@ -395,22 +441,232 @@ fn turned_faces_do_not_stand_in_the_way<S: EdgeStore>() {
     assert!((30..110).contains(&differ.count()));
 }
 
-/// Nothing asked, nothing changed.
+/// Nothing asked, nothing changed: best has nothing to fit either.
 fn ratio_one_is_the_identity<S: EdgeStore>() {
     let targets = Targets {
         ratio: Some(1.0),
         ..Targets::default()
     };
-    for shape in [bumpy(8), shapes::three_fins(3), shapes::moebius(9)] {
-        let (same, report) = run_in::<S>(
-            shape.clone(),
-            Options {
+    for quality in QUALITIES {
+        for shape in [bumpy(8), shapes::three_fins(3), shapes::moebius(9)] {
+            let options = Options {
                 targets,
+                quality,
                 ..Options::default()
-            },
+            };
+            let (same, report) = run_in::<S>(shape.clone(), options);
+            assert_eq!(same, mesh(shape), "{quality:?}");
+            assert_eq!(report.tally.collapses, 0);
+        }
+    }
+}
+
+/// A cube whose sides are bumpy; the bumps vanish at the edges, which stay straight.
+fn bumpy_cube() -> Shape {
+    let (mut positions, triangles) = cube(4);
+    let is_flush = |c: f32| c == 0.0 || c == 1.0;
+    for p in &mut positions {
+        let flush = p.to_array().map(is_flush);
+        if let [axis] = (0..3).filter(|&i| flush[i]).collect::<Vec<_>>()[..] {
+            let wave = |c: f32| (4.0 * std::f32::consts::PI * c).sin();
+            p[axis] += 0.02 * wave(p[(axis + 1) % 3]) * wave(p[(axis + 2) % 3]);
+        }
+    }
+    (positions, triangles)
+}
+
+/// The two ends of every edge at which a closed mesh turns by more than `degrees`.
+fn sharp_edges(mesh: &IndexedMesh, degrees: f32) -> Vec<[Vec3; 2]> {
+    let at = |v: u32| mesh.positions()[v as usize];
+    let mut sides = std::collections::BTreeMap::<_, Vec<Vec3>>::new();
+    for &[a, b, c] in mesh.triangles() {
+        let normal = (at(b) - at(a)).cross(at(c) - at(a));
+        for [v, w] in [[a, b], [b, c], [c, a]] {
+            sides.entry([v.min(w), v.max(w)]).or_default().push(normal);
+        }
+    }
+    let turn = |normals: &[Vec3]| normals[0].angle_between(normals[1]).to_degrees();
+    let sharp = sides.iter().filter(|(_, normals)| turn(normals) > degrees);
+    sharp.map(|(ends, _)| ends.map(at)).collect()
+}
+
+/// The eight corners that are there bit for bit.
+fn corners_of_unit_cube(mesh: &IndexedMesh) -> usize {
+    let is_corner = |p: &&Vec3| p.to_array().iter().all(|&c| c == 0.0 || c == 1.0);
+    mesh.positions().iter().filter(is_corner).count()
+}
+
+/// A crease is a curve of its own and ends where curves meet: of a bumpy cube, which turns by 62° and
+/// more at its edges and by under 28° elsewhere, the corners stay bit for bit and the edges stay
+/// whole. Without the option, corners and edges are but expensive places: they move.
+fn creases_stay_where_they_are<S: EdgeStore>() {
+    for quality in QUALITIES {
+        let run = |feature_angle_degrees| {
+            let options = Options {
+                feature_angle_degrees,
+                ..to_triangles_in(quality, 300)
+            };
+            run_in::<S>(bumpy_cube(), options)
+        };
+        let (small, report) = run(Some(45.0));
+        assert_eq!(report.triangles_out, 300, "{quality:?}");
+        assert_eq!(corners_of_unit_cube(&small), 8, "{quality:?}");
+        let sharp = sharp_edges(&small, 45.0);
+        for p in sharp.iter().flatten() {
+            let off = p.to_array().map(|c| c.abs().min((c - 1.0).abs()));
+            let on_sides = off.iter().filter(|&&d| d < 1e-3).count();
+            assert!(on_sides >= 2, "{quality:?}: {p} is off the edges");
+        }
+        let length: f32 = sharp.iter().map(|[a, b]| a.distance(*b)).sum();
+        assert!((length - 12.0).abs() < 1e-3, "{quality:?}: {length}");
+
+        let (plain, report) = run(None);
+        assert_eq!(report.triangles_out, 300, "{quality:?}");
+        assert!(corners_of_unit_cube(&plain) < 8, "{quality:?}");
+    }
+}
+
+/// A sheet of quads, each covered twice, by the two triangles of either diagonal: a flat pocket of
+/// four faces on four vertices. Pockets enclose something, so they stay; where the topology may
+/// change they fall flat, and with them goes every edge of four faces.
+fn flat_pockets_fall_flat<S: EdgeStore>() {
+    let n = 8u32;
+    let (positions, mut triangles) = shapes::grid(n, n);
+    for quad in 0..(n * n) as usize {
+        let ([a, b, c], d) = (triangles[2 * quad], triangles[2 * quad + 1][2]);
+        triangles.extend([[a, d, b], [b, d, c]]);
+    }
+    let before = info(mesh((positions.clone(), triangles.clone())), true).unwrap();
+    assert_eq!(before.non_manifold_edges, 2 * (n * (n - 1)) as usize);
+    for quality in QUALITIES {
+        let run = |topology| {
+            let options = Options {
+                topology,
+                ..to_triangles_in(quality, 2)
+            };
+            run_in::<S>((positions.clone(), triangles.clone()), options)
+        };
+        let (small, report) = run(Topology::Simplify);
+        assert!(report.triangles_out <= 8, "{quality:?}: {report:?}");
+        assert!(report.tally.contractions > 0, "{quality:?}");
+        let after = info(small.clone(), true).unwrap();
+        assert_eq!(
+            (after.non_manifold_edges, after.non_manifold_vertices),
+            (0, 0),
+            "{quality:?}"
         );
-        assert_eq!(same, mesh(shape));
-        assert_eq!(report.tally.collapses, 0);
+        let original = mesh((positions.clone(), triangles.clone()));
+        let largest = measured(&original, &small)
+            .surface
+            .two_sided_of_diagonal
+            .max;
+        assert!(largest < 1e-6, "{quality:?}: {largest}");
+
+        let (_, report) = run(Topology::Preserve);
+        assert!(report.stopped_short, "{quality:?}");
+        assert_eq!(report.stop_reason, StopReason::Blocked, "{quality:?}");
+        assert!(report.blocked.unwrap().link > 0, "{quality:?}");
+        let pockets = (n * n) as usize;
+        assert!(
+            report.triangles_out >= 4 * pockets,
+            "{quality:?}: {report:?}"
+        );
+    }
+}
+
+/// A sphere and fifty tiny ones far from it, which have most of the vertices. A component costs four
+/// triangles at least; where it may go, what is worth nothing goes first.
+fn tiny_components_go_where_they_may<S: EdgeStore>() {
+    let big = shapes::icosphere(3);
+    let (mut positions, mut triangles) = big.clone();
+    let (tiny, faces) = shapes::icosphere(1);
+    for i in 0..50 {
+        let first = positions.len() as u32;
+        let angle = i as f32;
+        let center = Vec3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 0.1 * angle - 2.5);
+        positions.extend(tiny.iter().map(|&p| center + 1e-3 * p));
+        triangles.extend(faces.iter().map(|t| t.map(|v| v + first)));
+    }
+    for quality in QUALITIES {
+        let run = |topology| {
+            let options = Options {
+                topology,
+                check: false,
+                tier: TierChoice::Fixed(S::TIER),
+                ..to_triangles_in(quality, 320)
+            };
+            decimate(mesh((positions.clone(), triangles.clone())), &options).unwrap()
+        };
+        let (small, report) = run(Topology::Simplify);
+        assert_eq!(
+            info(small.clone(), true).unwrap().components,
+            1,
+            "{quality:?}"
+        );
+        assert_eq!(report.tally.removed_components, 50, "{quality:?}");
+        assert!((316..=320).contains(&report.triangles_out), "{quality:?}");
+        // A sphere's limit is 0.2705 over the number of triangles; its faces are 1280 to begin with.
+        let rms = measured(&mesh(big.clone()), &small)
+            .surface
+            .two_sided_of_diagonal
+            .rms;
+        assert!(rms < 2.0 * 0.2705 / 320.0, "{quality:?}: {rms}");
+
+        let (small, report) = run(Topology::Preserve);
+        assert_eq!(info(small, true).unwrap().components, 51, "{quality:?}");
+        assert_eq!(report.tally.removed_components, 0, "{quality:?}");
+    }
+}
+
+/// A sheet cut from end to end but for its ends, the cut 1e-4 wide. Closing it moves a rim by less
+/// than the coarser sheet is off already, so it closes where it may; else it is a boundary loop.
+fn a_hairline_gap_closes_where_it_may<S: EdgeStore>() {
+    let n = 24u32;
+    let (mut positions, mut triangles) = bumpy(n);
+    let middle = |v: u32| v % (n + 1) == n / 2 && (1..n).contains(&(v / (n + 1)));
+    let right = |t: &[u32; 3]| t.iter().any(|&v| v % (n + 1) > n / 2);
+    let cut: Vec<u32> = (0..positions.len() as u32).filter(|&v| middle(v)).collect();
+    let first = positions.len() as u32;
+    for &v in &cut {
+        let across = positions[v as usize] + 1e-4 * Vec3::X;
+        positions.push(across);
+    }
+    for t in triangles.iter_mut().filter(|t| right(t)) {
+        for v in t {
+            if let Some(i) = cut.iter().position(|c| c == v) {
+                *v = first + i as u32;
+            }
+        }
+    }
+    let original = mesh((positions, triangles));
+    let before = info(original.clone(), true).unwrap();
+    assert_eq!(
+        (before.boundary_loops, before.boundary_edges),
+        (2, 6 * n as usize)
+    );
+    for quality in QUALITIES {
+        let run = |topology| {
+            let options = Options {
+                topology,
+                ..to_triangles_in(quality, 120)
+            };
+            let (small, report) = decimate(original.clone(), &tiered::<S>(options)).unwrap();
+            let c = measured(&original, &small);
+            assert_eq!(c.new_non_manifold_edges, 0);
+            (info(small, true).unwrap(), report, c)
+        };
+        let (kept, _, kept_distance) = run(Topology::Preserve);
+        assert_eq!(kept.boundary_loops, 2, "{quality:?}");
+        let (closed, report, distance) = run(Topology::Simplify);
+        assert_eq!(
+            closed.boundary_loops, 1,
+            "{quality:?}: {}",
+            closed.boundary_edges
+        );
+        assert!(closed.boundary_edges < kept.boundary_edges, "{quality:?}");
+        assert!(report.tally.contractions > 0, "{quality:?}");
+        let rms = |c: &Comparison| c.surface.two_sided.rms;
+        assert!(rms(&distance) < 1.05 * rms(&kept_distance), "{quality:?}");
     }
 }
 
@@ -431,6 +687,10 @@ for_each_tier!(
     double_sided_sheets_stay_double,
     turned_faces_do_not_stand_in_the_way,
     ratio_one_is_the_identity,
+    creases_stay_where_they_are,
+    flat_pockets_fall_flat,
+    tiny_components_go_where_they_may,
+    a_hairline_gap_closes_where_it_may,
 );
 
 /// The tiers give the same mesh, bit for bit.
@@ -465,14 +725,295 @@ fn threads_give_the_same_bits() {
 #[test]
 fn scaling_by_a_power_of_two_scales_the_result() {
     let (positions, triangles) = bumpy(20);
-    let (expected, _) = run_in::<Full>((positions.clone(), triangles.clone()), to_triangles(150));
-    for power in [-60, -20, 1, 30, 90] {
-        let factor = 2f32.powi(power);
-        let scaled = positions.iter().map(|&p| p * factor).collect();
-        let (small, _) = run_in::<Full>((scaled, triangles.clone()), to_triangles(150));
-        assert_eq!(small.triangles(), expected.triangles(), "2^{power}");
-        for (p, q) in small.positions().iter().zip(expected.positions()) {
-            assert_eq!(*p, *q * factor, "2^{power}");
+    for quality in QUALITIES {
+        let run = |positions| {
+            let shape = (positions, triangles.clone());
+            run_in::<Full>(shape, to_triangles_in(quality, 150)).0
+        };
+        let expected = run(positions.clone());
+        for power in [-60, -20, 1, 30, 90] {
+            let factor = 2f32.powi(power);
+            let small = run(positions.iter().map(|&p| p * factor).collect());
+            assert_eq!(
+                small.triangles(),
+                expected.triangles(),
+                "{quality:?}, 2^{power}"
+            );
+            for (p, q) in small.positions().iter().zip(expected.positions()) {
+                assert_eq!(*p, *q * factor, "{quality:?}, 2^{power}");
+            }
+        }
+    }
+}
+
+/// Smaller, a millionth of a millionth of it or far away: the same count, and the same distance for
+/// its size. Only rounding differs, so only by chance.
+#[test]
+fn scale_and_place_do_not_matter() {
+    let (positions, triangles) = bumpy(60);
+    let original = mesh((positions.clone(), triangles.clone()));
+    let scaled = |factor: f32| {
+        let positions = positions.iter().map(|&p| p * factor).collect();
+        mesh((positions, triangles.clone()))
+    };
+    let mut far = MeshBuilder::default();
+    let place = 1e6 * original.diagonal() * DVec3::new(1.0, -0.7, 0.3);
+    for p in original.points() {
+        far.push_double((p + place).to_array());
+    }
+    triangles.iter().for_each(|&t| far.push_triangle(t));
+    let far = far.finish().unwrap();
+    assert!(far.origin().length() > 1e6);
+    for quality in QUALITIES {
+        let run = |original: &IndexedMesh| {
+            let options = to_triangles_in(quality, 700);
+            let (small, report) = decimate(original.clone(), &options).unwrap();
+            assert!((699..=700).contains(&report.triangles_out), "{quality:?}");
+            (
+                measured(original, &small).surface.two_sided_of_diagonal.rms,
+                small,
+            )
+        };
+        let (expected, near) = run(&original);
+        for (name, moved) in [
+            ("1e-6", scaled(1e-6)),
+            ("1e-30", scaled(1e-30)),
+            ("far", far.clone()),
+        ] {
+            let ratio = run(&moved).0 / expected;
+            assert!((ratio - 1.0).abs() < 0.01, "{quality:?}, {name}: {ratio}");
+        }
+        // The origin alone is only carried along.
+        let there = IndexedMesh::with_origin(place, positions.clone(), triangles.clone()).unwrap();
+        let (_, small) = run(&there);
+        assert_eq!(small.origin(), place);
+        assert!(small.positions() == near.positions() && small.triangles() == near.triangles());
+    }
+}
+
+/// Stretched, other collapses are cheap; those of the original, stretched along, are there to be
+/// found and are not better.
+#[test]
+fn a_stretched_mesh_is_decimated_as_what_it_is() {
+    let stretched = |mesh: &IndexedMesh| {
+        let stretch = Vec3::new(30.0, 1.0, 1.0);
+        let positions = mesh.positions().iter().map(|&p| p * stretch).collect();
+        IndexedMesh::new(positions, mesh.triangles().to_vec()).unwrap()
+    };
+    for shape in [bumpy(50), shapes::icosphere(4), shapes::torus(60, 30)] {
+        let plain = mesh(shape);
+        let long = stretched(&plain);
+        for quality in QUALITIES {
+            let options = to_triangles_in(quality, 500);
+            let run = |mesh: &IndexedMesh| decimate(mesh.clone(), &options).unwrap();
+            let ((small, _), (round, _)) = (run(&long), run(&plain));
+            let count = round.triangle_count();
+            assert_eq!(small.triangle_count(), count, "{quality:?}");
+            let rms = |mesh: &IndexedMesh| measured(&long, mesh).surface.two_sided.rms;
+            let ratio = rms(&small) / rms(&stretched(&round));
+            assert!(ratio < 1.01, "{quality:?}: {ratio}");
+        }
+    }
+}
+
+/// Vertices on edges, where they belong to one side alone, make triangles of no area: the surface is
+/// the same, and so is what is left of it.
+#[test]
+fn triangles_of_no_area_do_no_harm() {
+    let (mut positions, triangles) = bumpy(64);
+    // On a grid, so that the middle of an edge is exactly on it.
+    for p in &mut positions {
+        p.z = (p.z * 4096.0).round() / 4096.0;
+    }
+    let plain = mesh((positions.clone(), triangles.clone()));
+    let mut split = Vec::new();
+    for (i, &[a, b, c]) in triangles.iter().enumerate() {
+        if i % 4 == 1 && i < 8000 {
+            let m = positions.len() as u32;
+            positions.push((positions[a as usize] + positions[b as usize]) / 2.0);
+            split.extend([[a, m, c], [m, b, c], [a, b, m]]);
+        } else {
+            split.push([a, b, c]);
+        }
+    }
+    let split = mesh((positions, split));
+    assert_eq!(info(split.clone(), true).unwrap().zero_area_faces, 2000);
+    for quality in QUALITIES {
+        let rms = |mesh: &IndexedMesh| {
+            let (small, report) = decimate(mesh.clone(), &to_triangles_in(quality, 800)).unwrap();
+            assert!((799..=800).contains(&report.triangles_out), "{quality:?}");
+            measured(&plain, &small).surface.two_sided.rms
+        };
+        let ratio = rms(&split) / rms(&plain);
+        assert!((ratio - 1.0).abs() < 0.05, "{quality:?}: {ratio}");
+    }
+}
+
+/// Shapes on which nothing is flat, with the triangles to come down to.
+fn smooth() -> [(&'static str, IndexedMesh, usize); 3] {
+    [
+        ("bumpy grid", mesh(bumpy(60)), 500),
+        ("icosphere", mesh(shapes::icosphere(4)), 400),
+        ("torus", mesh(shapes::torus(80, 40)), 500),
+    ]
+}
+
+/// Fitting lowers the distance that it is measured by, and does not pay for it with the largest.
+#[test]
+fn best_is_nearer_than_standard() {
+    for (name, original, triangles) in smooth() {
+        let run = |quality| {
+            let options = to_triangles_in(quality, triangles);
+            let (small, report) = decimate(original.clone(), &options).unwrap();
+            let distances = measured(&original, &small).surface.two_sided;
+            (report.triangles_out, distances)
+        };
+        let (standard, best) = (run(Quality::Standard), run(Quality::Best));
+        assert_eq!(standard.0, best.0, "{name}");
+        let rms = best.1.rms / standard.1.rms;
+        let largest = best.1.max / standard.1.max;
+        println!("{name}: rms {rms}, Hausdorff {largest}");
+        assert!(rms < 0.95, "{name}: rms {rms}");
+        assert!(largest < 1.01, "{name}: Hausdorff {largest}");
+    }
+}
+
+/// Nearest is often the other side: it must not be fitted to, nor collapsed onto.
+#[test]
+fn a_thin_double_sheet_keeps_its_volume() {
+    let n = 40u32;
+    let (mut positions, mut triangles) = bumpy(n);
+    let below = positions.len() as u32;
+    positions.extend_from_within(..);
+    positions[below as usize..]
+        .iter_mut()
+        .for_each(|p| p.z -= 1e-3);
+    triangles.extend(triangles.clone().iter().map(|t| t.map(|v| v + below)));
+    let half = triangles.len() / 2;
+    triangles[half..].iter_mut().for_each(|t| t.swap(1, 2));
+    let at = |x: u32, y: u32| y * (n + 1) + x;
+    for i in 0..n {
+        for [a, b] in [
+            [at(i, 0), at(i + 1, 0)],
+            [at(n, i), at(n, i + 1)],
+            [at(i + 1, n), at(i, n)],
+            [at(0, i + 1), at(0, i)],
+        ] {
+            triangles.extend([[a, b + below, b], [a, a + below, b + below]]);
+        }
+    }
+    let original = mesh((positions, triangles));
+    let before = volume(&original);
+    assert!((before - 1e-3).abs() < 1e-5, "{before}");
+    for quality in QUALITIES {
+        let wanted = original.triangle_count() / 10;
+        let (small, report) =
+            decimate(original.clone(), &to_triangles_in(quality, wanted)).unwrap();
+        assert_eq!(report.triangles_out, wanted, "{quality:?}");
+        let ratio = volume(&small) / before;
+        println!("{quality:?}: {ratio} of the volume");
+        assert!(
+            (ratio - 1.0).abs() < 0.05,
+            "{quality:?}: {ratio} of the volume"
+        );
+    }
+}
+
+/// A vertex that shoots off is farther away than anyone estimated; smooth shapes and a stretched one.
+#[test]
+fn no_vertex_is_farther_than_three_estimates() {
+    let stretch = |p: &Vec3| *p * Vec3::new(30.0, 1.0, 1.0);
+    let (positions, triangles) = bumpy(50);
+    let long = mesh((positions.iter().map(stretch).collect(), triangles));
+    for (name, original, triangles) in smooth().into_iter().chain([("stretched", long, 500)]) {
+        for quality in QUALITIES {
+            let options = to_triangles_in(quality, triangles);
+            let (small, report) = decimate(original.clone(), &options).unwrap();
+            let farthest = farthest_vertex(&small, &original);
+            let share = farthest / report.max_error_estimate;
+            println!("{name}, {quality:?}: {share} of the estimate");
+            assert!(
+                farthest > 0.0 && share < 3.0,
+                "{name}, {quality:?}: {share}"
+            );
+        }
+    }
+}
+
+/// What is fitted is measured: on a closed smooth shape the error that stops it is nearly a bound.
+#[test]
+fn best_keeps_an_error_limit_as_measured() {
+    for (name, original, _) in &smooth()[1..] {
+        for share in [1e-3, 4e-3] {
+            let limit = share * original.diagonal();
+            let run = |quality| {
+                let options = Options {
+                    quality,
+                    ..to_error(limit)
+                };
+                decimate(original.clone(), &options).unwrap()
+            };
+            let (small, report) = run(Quality::Best);
+            assert_eq!(report.stop_reason, StopReason::MaxError, "{name}");
+            let largest = measured(original, &small).surface.two_sided.max / limit;
+            println!(
+                "{name}, {share}: {largest} of the limit, {}",
+                report.triangles_out
+            );
+            assert!(largest < 1.05, "{name}: {largest} of the limit");
+            // Fitting makes room for more collapses.
+            assert!(
+                report.triangles_out < run(Quality::Standard).1.triangles_out,
+                "{name}"
+            );
+        }
+    }
+}
+
+/// Where the boundary is free nobody says where it should be; fitting must not let it fly off.
+#[test]
+fn a_free_boundary_is_not_fitted_away() {
+    for shape in [bumpy(50), wall(60, 20)] {
+        let original = mesh(shape);
+        let farthest = |quality| {
+            let options = Options {
+                boundary: Boundary::Free,
+                ..to_triangles_in(quality, 300)
+            };
+            let (small, report) = decimate(original.clone(), &options).unwrap();
+            assert!((299..=300).contains(&report.triangles_out), "{quality:?}");
+            farthest_vertex(&small, &original)
+        };
+        let (standard, best) = (farthest(Quality::Standard), farthest(Quality::Best));
+        println!("{best} after {standard}");
+        assert!(best <= 1.01 * standard, "{best} after {standard}");
+    }
+}
+
+/// An angle is none, or nobody can turn by it.
+#[test]
+fn a_feature_angle_out_of_range_is_an_error() {
+    for (degrees, is_right) in [
+        (f64::NAN, false),
+        (-5.0, false),
+        (720.0, false),
+        (f64::INFINITY, false),
+        (30.0, true),
+        (90.0, true),
+    ] {
+        let options = Options {
+            feature_angle_degrees: Some(degrees),
+            ..to_triangles(100)
+        };
+        match decimate(mesh(bumpy(10)), &options) {
+            Ok(_) => assert!(is_right, "{degrees}"),
+            Err(Error::InvalidOptions(message)) => {
+                assert!(
+                    !is_right && message.contains("angle"),
+                    "{degrees}: {message}"
+                );
+            }
+            Err(error) => panic!("{degrees}: {error}"),
         }
     }
 }
@@ -481,7 +1022,7 @@ fn scaling_by_a_power_of_two_scales_the_result() {
 /// same weight everywhere. 0 and what single precision cannot multiply are among them.
 #[test]
 fn scaling_the_weights_changes_nothing() {
-    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+    for quality in QUALITIES {
         let run = |mesh| {
             let options = Options {
                 quality,
@@ -535,7 +1076,7 @@ fn a_heavy_sphere_keeps_its_volume() {
 #[test]
 fn extreme_weights_stop_nothing() {
     let weights = [0.0, f32::MIN_POSITIVE, 1e-20, 1.0, 1e20, f32::MAX];
-    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+    for quality in QUALITIES {
         for few in 1..=weights.len() {
             let mix = |p: Vec3| weights[(p.x * 97.0 + p.y * 31.0) as usize % few];
             let options = Options {

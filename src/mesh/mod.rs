@@ -21,6 +21,7 @@ mod ids;
 mod link;
 mod non_manifold;
 mod orient;
+mod pinch;
 mod ring;
 mod store;
 #[cfg(test)]

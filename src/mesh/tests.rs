@@ -662,7 +662,63 @@ fn a_component_is_removed_alone<S: EdgeStore>() {
     }
 }
 
+fn handle_loops<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId) -> Vec<[EdgeId; 3]> {
+    let mut loops = mesh.open_loops(e).to_vec();
+    loops.retain(|edges| mesh.is_around_handle(edges));
+    loops
+}
+
+/// A torus that is three edges around its tube somewhere: pinching there leaves a sphere. Collapses
+/// before give the slots.
+fn pinching_a_torus_leaves_a_sphere<S: EdgeStore>() {
+    let mut pinches = 0;
+    for seed in 0..40 {
+        let (positions, triangles) = shapes::torus(11, 7);
+        let mut mesh = Mesh::<S>::from_triangles(positions.len(), &triangles);
+        let mut random = Random(seed + 1);
+        let (mut faces, mut vertices) = (Vec::new(), Vec::new());
+        for _ in 0..400 {
+            let edges = live_edges(&mesh);
+            let e = edges[random.below(edges.len())];
+            if mesh.link_condition(e) {
+                let record = mesh.collapse(e);
+                faces.extend(record.dead_faces);
+                vertices.push(record.removed);
+            } else if let Some(around) = handle_loops(&mesh, e).first() {
+                let caps = [faces.pop().unwrap(), faces.pop().unwrap()];
+                let new = [(); 3].map(|()| vertices.pop().unwrap());
+                mesh.pinch(around, caps, new);
+                mesh.check()
+                    .unwrap_or_else(|w| panic!("seed {seed}, {around:?}: {w}"));
+                let euler = mesh.vertex_count() + mesh.face_count();
+                assert_eq!(euler, mesh.edges().count() + 2, "seed {seed}: a sphere");
+                assert_eq!(mesh.components().len(), 1, "seed {seed}");
+                pinches += 1;
+                break;
+            }
+        }
+    }
+    assert!(pinches > 30, "{pinches}");
+}
+
+/// A loop around the neck of an hourglass separates: no handle to pinch.
+fn a_neck_is_no_handle<S: EdgeStore>() {
+    let (positions, triangles) = shapes::icosphere(2);
+    let mut mesh = Mesh::<S>::from_triangles(positions.len(), &triangles);
+    let mut random = Random(7);
+    for _ in 0..2000 {
+        let edges = live_edges(&mesh);
+        let e = edges[random.below(edges.len())];
+        assert!(handle_loops(&mesh, e).is_empty(), "{e:?}");
+        if mesh.face_count() > 60 && mesh.link_condition(e) {
+            mesh.collapse(e);
+        }
+    }
+}
+
 for_each_tier!(
+    pinching_a_torus_leaves_a_sphere,
+    a_neck_is_no_handle,
     a_component_is_removed_alone,
     contractions_make_nothing_worse,
     opposites_equal_brute_force,

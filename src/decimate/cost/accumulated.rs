@@ -136,8 +136,25 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         changed.push(kept);
     }
 
+    fn after_pinch(
+        &mut self,
+        _: &Surface<S>,
+        cut: [[VertexId; 2]; 3],
+        changed: &mut Vec<VertexId>,
+    ) {
+        for [old, new] in cut {
+            self.quadrics[new.index()] = self.quadrics[old.index()];
+        }
+        changed.clear();
+        changed.extend(cut.as_flattened());
+    }
+
     fn exact_below(&self) -> usize {
         usize::MAX
+    }
+
+    fn moves_vertices(&self) -> bool {
+        self.placement == Placement::Optimal
     }
 
     fn bytes(&self) -> usize {

@@ -267,8 +267,29 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         });
     }
 
+    fn after_pinch(
+        &mut self,
+        surface: &Surface<S>,
+        cut: [[VertexId; 2]; 3],
+        changed: &mut Vec<VertexId>,
+    ) {
+        changed.clear();
+        changed.extend(cut.as_flattened());
+        let around = cut.as_flattened().iter();
+        changed.extend(around.flat_map(|&v| surface.mesh.neighbours(v)));
+        changed.sort_unstable();
+        changed.dedup();
+        for &x in &*changed {
+            self.refresh(surface, x);
+        }
+    }
+
     fn exact_below(&self) -> usize {
         EXACT_BELOW
+    }
+
+    fn moves_vertices(&self) -> bool {
+        self.placement == Placement::Optimal
     }
 
     fn bytes(&self) -> usize {

@@ -39,9 +39,21 @@ pub trait Cost<S: EdgeStore>: Sync {
         changed: &mut Vec<VertexId>,
     );
 
+    /// Gives each second vertex the state of the first, from which it was cut, brings all of them up
+    /// to date, and lists the vertices whose edges cost something else now.
+    fn after_pinch(
+        &mut self,
+        surface: &Surface<S>,
+        cut: [[VertexId; 2]; 3],
+        changed: &mut Vec<VertexId>,
+    );
+
     /// Below so many faces `after_collapse` lists every vertex whose edges cost something else;
     /// above, it may leave out where that is little.
     fn exact_below(&self) -> usize;
+
+    /// Whether vertices may go where none was.
+    fn moves_vertices(&self) -> bool;
 
     /// The bytes that the state holds.
     fn bytes(&self) -> usize;
