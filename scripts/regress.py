@@ -21,6 +21,7 @@ import argparse
 import csv
 import hashlib
 import importlib.metadata
+import itertools
 import json
 import math
 import pathlib
@@ -37,7 +38,8 @@ import peers
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RACE = ROOT / "scripts/race/target/release/race"
 DEFAULT_PEERS = ["fast-simplification", "pymeshlab", "vtk", "meshoptimizer"]
-QUICK = {"meshes": [ROOT / "data/sample.ply"], "ratios": [0.5, 0.1], "peers": DEFAULT_PEERS[:2], "runs": 1}
+QUICK = {"meshes": [ROOT / "data/sample.ply"], "ratios": [0.5, 0.1], "peers": DEFAULT_PEERS[:2], "runs": 1,
+         "qualities": ["fast", "standard", "best"]}
 EXTRA_TRIANGLES = 1.02  # above this multiple of the target an output does not compete
 RMS_MARGIN, HAUSDORFF_MARGIN = 1.03, 1.10  # of the bounds above what was measured
 EXACT = 1e-9  # of the diagonal; below it a distance is rounding
@@ -54,7 +56,7 @@ COLUMNS = [("triangles", "triangles", 1, 0, False), ("rms_of_diagonal", "rms", 1
            ("new_non_manifold_edges", "new non-manifold", 1, 0, False), ("seconds", "s", 1, 3, True),
            ("megabytes", "MB", 1, 1, True)]
 RATED = [c for c in COLUMNS if c[4]]
-EXPECTED_COLUMNS = ["mesh", "ratio", "triangles_out", "rms_of_diagonal_max", "hausdorff_of_diagonal_max"]
+EXPECTED_COLUMNS = ["mesh", "ratio", "quality", "triangles_out", "rms_of_diagonal_max", "hausdorff_of_diagonal_max"]
 # The first ten as in records.csv.
 CSV_COLUMNS = ["mesh", "ratio_kept", "tool", "triangles", "rms_of_diagonal", "mean_of_diagonal",
                "hausdorff_of_diagonal", "mean_triangle_quality", "boundary_edges", "non_manifold_edges",
@@ -103,7 +105,7 @@ def arrays(decimate, mesh, folder):
 class Ours:
     def __init__(self, binary, quality, tier):
         self.tool = "decimate " + " ".join(word for word in (quality, tier) if word)
-        self.is_default = quality is None  # the one that expected.csv is about
+        self.quality = quality or "standard"
         self.command = [binary, "--tier", tier, "--quiet", "--report", "-"]
         if quality:
             self.command += ["--quality", quality]
@@ -304,20 +306,28 @@ def read_csv(path):
         return list(csv.DictReader(file))
 
 
+def read_expected(path):
+    return {(r["mesh"], float(r["ratio"]), r["quality"]): r for r in read_csv(path)} if path.exists() else {}
+
+
+def of_quality(case, ours, quality):
+    """The outputs of ours in one quality, whatever the tier."""
+    tools = [o.tool for o in ours if o.quality == quality]
+    return [o for o in case["outputs"] if o["tool"] in tools and not o["error"]]
+
+
 def check(cases, ours, options):
     """What is wrong with ours, and remarks, as lines; the cases whose mesh lies beside expected.csv."""
     wrong, remarks = [], []
-    expected = {}
-    if options.expected.exists():
-        expected = {(r["mesh"], float(r["ratio"])): r for r in read_csv(options.expected)}
-    for case in cases:
-        where = f"{case['file_name']} {case['ratio']:g}"
-        outputs = [o for o in case["outputs"] if o["tool"] in ours and not o["error"]]
+    expected = read_expected(options.expected)
+    for case, quality in itertools.product(cases, dict.fromkeys(o.quality for o in ours)):
+        where = f"{case['file_name']} {case['ratio']:g} {quality}"
+        outputs = of_quality(case, ours, quality)
         if len({h for o in outputs for h in o["hashes"]}) > 1:
             wrong.append(f"{where}: the bytes differ among tiers or runs")
         if not case["is_expected"] or not outputs:
             continue
-        row = expected.get((case["file_name"], case["ratio"]))
+        row = expected.get((case["file_name"], case["ratio"], quality))
         if row is None:
             remarks.append(f"{where}: not in {options.expected}; --write-expected adds it")
             continue
@@ -343,18 +353,19 @@ def round_up(value):
 
 def write_expected(cases, ours, path):
     """Replaces the rows of these cases, and leaves the others."""
-    rows = {(r["mesh"], float(r["ratio"])): r for r in read_csv(path)} if path.exists() else {}
-    for case in cases:
-        output = next((o for o in case["outputs"] if o["tool"] in ours and not o["error"]), None)
+    rows = read_expected(path)
+    for case, quality in itertools.product(cases, dict.fromkeys(o.quality for o in ours)):
+        output = next(iter(of_quality(case, ours, quality)), None)
         if case["is_expected"] and output:
-            rows[case["file_name"], case["ratio"]] = {
-                "mesh": case["file_name"], "ratio": f"{case['ratio']:g}", "triangles_out": output["triangles"],
+            rows[case["file_name"], case["ratio"], quality] = {
+                "mesh": case["file_name"], "ratio": f"{case['ratio']:g}", "quality": quality,
+                "triangles_out": output["triangles"],
                 "rms_of_diagonal_max": round_up(max(output["rms_of_diagonal"] * RMS_MARGIN, EXACT)),
                 "hausdorff_of_diagonal_max": round_up(max(output["hausdorff_of_diagonal"] * HAUSDORFF_MARGIN, EXACT))}
     with open(path, "w", newline="") as file:
         writer = csv.DictWriter(file, EXPECTED_COLUMNS, lineterminator="\n")
         writer.writeheader()
-        writer.writerows(row for _, row in sorted(rows.items(), key=lambda item: (item[0][0], -item[0][1])))
+        writer.writerows(row for _, row in sorted(rows.items(), key=lambda item: (item[0][0], -item[0][1], item[0][2])))
 
 
 def write_csv(cases, path):
@@ -395,7 +406,7 @@ def parse():
     parser.add_argument("--peers", nargs="*", default=DEFAULT_PEERS, choices=known, metavar="PEER",
                         help=f"of {', '.join(known)} (default: {' '.join(DEFAULT_PEERS)})")
     parser.add_argument("--runs", type=int, default=3, metavar="N")
-    parser.add_argument("--quick", action="store_true", help="data/sample.ply at 0.5 and 0.1, two peers, one run")
+    parser.add_argument("--quick", action="store_true", help="data/sample.ply at 0.5 and 0.1 in every quality, two peers, one run")
     parser.add_argument("--samples", type=int, default=200_000, metavar="N", help="on each surface (default 200000)")
     parser.add_argument("--timeout", type=float, default=600, metavar="SECONDS", help="for one run (default 600)")
     parser.add_argument("--records", type=pathlib.Path, metavar="RECORDS.csv",
@@ -457,12 +468,11 @@ def main():
             write_csv(cases, options.csv)
         if options.json:
             write_json(cases, others, options)
-    default = [o.tool for o in ours if o.is_default]
     wrong, remarks = [], []
     if options.write_expected:
-        write_expected(cases, default, options.expected)
+        write_expected(cases, ours, options.expected)
     else:
-        wrong, remarks = check(cases, default, options)
+        wrong, remarks = check(cases, ours, options)
     print()
     for line in remarks:
         print(f"remark: {line}")

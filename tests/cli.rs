@@ -1095,20 +1095,20 @@ fn surface_options_are_accepted() {
     assert!(folder.bytes("out.ply") == folder.bytes("standard.ply"));
 }
 
-/// The message names the flag, so that it is found in a long line.
+/// What cannot be read is named by its flag, what cannot be meant by its name, the value with it.
 #[test]
 fn wrong_surface_options_are_named() {
     let folder = Folder::with_hill();
-    for (flag, value) in [
-        ("--quality", "worst"),
-        ("--topology", "destroy"),
-        ("--feature-angle", "sharp"),
-        ("--feature-angle", "-5"),
-        ("--feature-angle", "720"),
-        ("--feature-angle", "nan"),
+    for (flag, value, needle) in [
+        ("--quality", "worst", "'worst' for '--quality"),
+        ("--topology", "destroy", "'destroy' for '--topology"),
+        ("--feature-angle", "sharp", "'sharp' for '--feature-angle"),
+        ("--feature-angle", "-5", "feature angle -5"),
+        ("--feature-angle", "720", "feature angle 720"),
+        ("--feature-angle", "nan", "feature angle NaN"),
     ] {
         let arguments = format!("hill.ply -o out.ply --ratio 0.5 {flag} {value}");
-        folder.run(&arguments).failed(2, flag);
+        folder.run(&arguments).failed(2, needle);
     }
     assert!(!folder.names().contains("out.ply"));
 }
