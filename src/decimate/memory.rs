@@ -11,7 +11,7 @@ const FITTING_BYTES: usize = 400;
 
 /// The most bytes that decimating a manifold mesh in a tier holds at once: the tier's words and
 /// positions; the triangles they are built from and the build's lists; then tensors or quadrics,
-/// stamps, deviations and the queue, or [what fitting takes](FITTING_BYTES).
+/// stamps, deviations and the queue, or what fitting takes.
 pub fn needed_bytes(quality: Quality, tier: Tier, vertices: usize, triangles: usize) -> u64 {
     let building = 12 * triangles + 15 * triangles + 4 * vertices;
     let collapsing = 48 * vertices + 36 * triangles;
