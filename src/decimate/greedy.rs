@@ -180,6 +180,10 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 }
                 Err(Rejection::Flip) => self.tally.rejected_flip += 1,
                 Err(Rejection::Error) => self.tally.rejected_error += 1,
+                Ok(way) if self.loss(&way).0 > candidate.cost => {
+                    let price = f64::from(self.loss(&way).0);
+                    self.queue.push(self.candidate_at(e, price));
+                }
                 Ok(way) => {
                     let merged = self.collapse(e, position, &way);
                     if check {
@@ -263,7 +267,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     }
 
     /// The contraction of `e`, where the topology may change and there are no creases to keep; none
-    /// that would overshoot the target or leave nothing.
+    /// that would leave nothing.
     fn contraction(&self, e: EdgeId) -> Option<Contraction> {
         if self.topology == Topology::Preserve || !self.surface.creases.is_empty() {
             return None;
@@ -271,8 +275,21 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         let contraction = self.surface.mesh.contraction(e)?;
         let dead = contraction.dead_faces().iter();
         let dead: usize = dead.map(|&f| self.surface.sides(f)).sum();
-        let overshoots = self.triangles + 1 < self.stop.triangles + dead;
-        (!overshoots && dead < self.triangles).then_some(contraction)
+        let (_, diagonal) = self.surface.extent(contraction.vanishing_faces());
+        let is_lost = !contraction.vanishing_faces().is_empty()
+            && self.stop.max_error.is_some_and(|limit| diagonal > limit);
+        (dead < self.triangles && !is_lost).then_some(contraction)
+    }
+
+    /// What vanishes in a way: its price, as that of a component, and its diagonal.
+    fn loss(&self, way: &Way) -> (f32, f64) {
+        match way {
+            Way::Contract(contraction) if !contraction.vanishing_faces().is_empty() => {
+                let (area, diagonal) = self.surface.extent(contraction.vanishing_faces());
+                ((area * diagonal * diagonal) as f32, diagonal)
+            }
+            _ => (0.0, 0.0),
+        }
     }
 
     /// Removes the cheapest component, unless that would overshoot the target or the error.
@@ -378,6 +395,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             Way::Contract(contraction) => Some(contraction),
         };
         self.tally.contractions += usize::from(contraction.is_some());
+        self.surface.lost = self.surface.lost.max(self.loss(way).1);
         let merged = self.surface.collapse(e, position, contraction);
         if self.topology == Topology::Simplify {
             self.free_faces.extend(&merged.collapse.dead_faces);

@@ -14,6 +14,8 @@ pub struct Contraction {
     kept: VertexId,
     /// The faces that go, ascending.
     dead: Vec<FaceId>,
+    /// Of two faces that went with each other, the one.
+    vanishing: Vec<FaceId>,
     /// The vertices whose surroundings change, both ends first.
     around: Vec<VertexId>,
 }
@@ -22,6 +24,12 @@ impl Contraction {
     /// The faces that go, ascending.
     pub fn dead_faces(&self) -> &[FaceId] {
         &self.dead
+    }
+
+    /// The faces in whose place nothing is left: two came to lie on each other, and where the
+    /// one stayed an edge would become a boundary.
+    pub fn vanishing_faces(&self) -> &[FaceId] {
+        &self.vanishing
     }
 
     /// The vertices whose surroundings change, but for the ends.
@@ -57,8 +65,8 @@ impl Triangle {
 impl<S: EdgeStore> Mesh<S> {
     /// What contracting `e` would do, where [`link_condition(e)`](Self::link_condition) forbids to
     /// collapse it: the faces at `e` go; of two faces that come to lie on each other one goes, or
-    /// both where nothing else holds them; edges that come to lie on each other become one. Nothing
-    /// where an edge or a vertex would become non-manifold (or more so), or an edge would become a
+    /// both where no other face is at one of their edges; edges that come to lie on each other become
+    /// one. Nothing where an edge or a vertex would become non-manifold (or more so), or an edge would become a
     /// boundary.
     ///
     /// Costs a walk around both ends and around all of their neighbours.
@@ -69,7 +77,7 @@ impl<S: EdgeStore> Mesh<S> {
         faces.extend(self.vertex_faces(kept));
         faces.sort_unstable();
         faces.dedup();
-        let mut dead = Vec::new();
+        let (mut dead, mut vanishing) = (Vec::new(), Vec::new());
         let mut living: Vec<Triangle> = Vec::new();
         for &face in &faces {
             let vertices = self.face_vertices(face);
@@ -97,6 +105,7 @@ impl<S: EdgeStore> Mesh<S> {
                     dead.push(second.face);
                     if others.contains(&0) {
                         dead.push(first.face);
+                        vanishing.push(first.face);
                     }
                     rims.push((first.face, [a, b]));
                 }
@@ -163,6 +172,7 @@ impl<S: EdgeStore> Mesh<S> {
             removed,
             kept,
             dead,
+            vanishing,
             around,
         })
     }
@@ -197,6 +207,7 @@ impl<S: EdgeStore> Mesh<S> {
             kept,
             dead,
             around,
+            ..
         } = contraction;
         let is_dead = |e: &EdgeId| dead.binary_search(&e.face()).is_ok();
         let mut outgoing: Vec<Vec<EdgeId>> = around
