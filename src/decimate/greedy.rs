@@ -71,6 +71,8 @@ pub struct Greedy<'a, S, C, Q> {
     /// Dead slots, to be used again where a pinch needs some.
     free_faces: Vec<FaceId>,
     free_vertices: Vec<VertexId>,
+    /// Boundary edges at gaps that could have been closed, had there been a dead face.
+    waiting: Vec<EdgeId>,
     tally: Tally,
 }
 
@@ -97,6 +99,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             surface,
             free_faces: Vec::new(),
             free_vertices: Vec::new(),
+            waiting: Vec::new(),
             tally,
         };
         greedy.tally.rejected_lock = greedy.locked_edges();
@@ -166,6 +169,9 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 continue;
             }
             let e = candidate.edge;
+            if self.fill(&candidate, &mut changed) {
+                continue;
+            }
             let Some(Evaluation { cost, position }) = self.evaluate(e) else {
                 continue;
             };
@@ -221,7 +227,19 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     }
 
     fn candidate(&self, edge: EdgeId) -> Option<Candidate> {
-        Some(self.candidate_at(edge, self.evaluate(edge)?.cost))
+        let cost = self.evaluate(edge).map(|evaluation| evaluation.cost);
+        let cheaper = cost.into_iter().chain(self.fill_price(edge));
+        Some(self.candidate_at(edge, cheaper.reduce(f64::min)?))
+    }
+
+    /// What closing the gap at the head of a boundary edge costs, where the topology may change.
+    fn fill_price(&self, e: EdgeId) -> Option<f64> {
+        let may = self.topology == Topology::Simplify && self.surface.creases.is_empty();
+        if may {
+            self.surface.fill_price(e)
+        } else {
+            None
+        }
     }
 
     fn candidate_at(&self, edge: EdgeId, cost: f64) -> Candidate {
@@ -318,6 +336,33 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
     }
 
+    /// Closes the gap at the head of a boundary edge by one face, where that costs no more than the
+    /// candidate. Whether it did.
+    fn fill(&mut self, candidate: &Candidate, changed: &mut Vec<VertexId>) -> bool {
+        let e = candidate.edge;
+        let price = self.fill_price(e).map(|price| price as f32);
+        if price.is_none_or(|price| price > candidate.cost) {
+            return false;
+        }
+        let Some(&face) = self.free_faces.last() else {
+            self.waiting.push(e);
+            return false;
+        };
+        let mesh = &self.surface.mesh;
+        let Some(next) = mesh.next_on_boundary(e) else {
+            return false;
+        };
+        let around = [mesh.tail(e), mesh.head(e), mesh.head(next)];
+        self.surface.fill(e, face);
+        self.free_faces.pop();
+        self.triangles += 1;
+        self.tally.filled_faces += 1;
+        self.cost
+            .after_change(self.surface, around.map(|v| [v, v]), changed);
+        self.reconsider(changed);
+        true
+    }
+
     /// Where a handle stands in the way of a candidate, pinches it off if that costs no more than the
     /// candidate does; else the candidate waits until its turn comes at that price.
     fn pinch(&mut self, candidate: &Candidate, changed: &mut Vec<VertexId>) {
@@ -377,7 +422,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         self.triangles += 2;
         self.tally.pinched_handles += 1;
         let cut = [[tails[0], x], [tails[1], y], [tails[2], z]];
-        self.cost.after_pinch(self.surface, cut, changed);
+        self.cost.after_change(self.surface, cut, changed);
         self.reconsider(changed);
     }
 
@@ -400,6 +445,12 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         if self.topology == Topology::Simplify {
             self.free_faces.extend(&merged.collapse.dead_faces);
             self.free_vertices.push(merged.collapse.removed);
+            for e in std::mem::take(&mut self.waiting) {
+                if self.surface.mesh.is_live_face(e.face()) {
+                    let candidate = self.candidate(self.surface.mesh.canonical(e));
+                    candidate.into_iter().for_each(|c| self.queue.push(c));
+                }
+            }
         }
         let dead = merged.collapse.dead_faces.iter();
         self.triangles -= dead.map(|&f| self.surface.sides(f)).sum::<usize>();

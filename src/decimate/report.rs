@@ -43,6 +43,8 @@ pub struct Tally {
     pub collapses_non_manifold: usize,
     /// Collapses, of these, that changed the topology, where that was allowed.
     pub contractions: usize,
+    /// Faces added to close gaps, where that was allowed.
+    pub filled_faces: usize,
     /// Handles pinched, where that was allowed.
     pub pinched_handles: usize,
     /// Components removed, where that was allowed.

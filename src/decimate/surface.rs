@@ -267,14 +267,8 @@ impl<S: EdgeStore> Surface<S> {
             }
         }
         self.mesh.pinch(edges, caps, vertices);
-        let turned = self.turned.get(edges[0].face().index()) == Some(&true);
         for cap in caps {
-            if let Some(flag) = self.turned.get_mut(cap.index()) {
-                *flag = turned;
-            }
-            if let Some(double) = self.double_sided.get_mut(cap.index()) {
-                *double = false;
-            }
+            self.revive(cap, edges[0].face());
         }
         for ((old, new), place) in tails.into_iter().zip(vertices).zip(places) {
             self.geometry.set_position(new, place);
@@ -287,6 +281,41 @@ impl<S: EdgeStore> Surface<S> {
             }
         }
         Some(())
+    }
+
+    /// The price of a face between the boundary edge `e` and the one behind it, where that closes a
+    /// gap: the face's area times its squared width. Nothing where the gap is wide against the edges,
+    /// or the face would lie on its neighbours.
+    pub fn fill_price(&self, e: EdgeId) -> Option<f64> {
+        /// The width of a gap against the shorter edge beside it.
+        const WIDE: f64 = 0.5;
+        let next = self.mesh.fill_condition(e)?;
+        let v = self.geometry.position(self.mesh.head(e));
+        let to_a = self.geometry.vector(v, self.mesh.tail(e));
+        let to_b = self.geometry.vector(v, self.mesh.head(next));
+        let shorter = to_a.length().min(to_b.length());
+        let normal = to_a.cross(to_b);
+        let is_beside = |e| self.geometry.normal(&self.mesh, e).dot(normal) > 0.0;
+        let may = (to_a - to_b).length() <= WIDE * shorter && is_beside(e) && is_beside(next);
+        let width = normal.length() / to_a.length().max(to_b.length());
+        may.then_some(normal.length() / 2.0 * width * width)
+    }
+
+    /// Puts the dead `face` between the boundary edge `e` and the one behind it.
+    pub fn fill(&mut self, e: EdgeId, face: FaceId) {
+        self.mesh.fill(e, face);
+        self.revive(face, e.face());
+    }
+
+    /// Gives a face that was dead what `beside` carries.
+    fn revive(&mut self, face: FaceId, beside: FaceId) {
+        let turned = self.turned.get(beside.index()) == Some(&true);
+        if let Some(flag) = self.turned.get_mut(face.index()) {
+            *flag = turned;
+        }
+        if let Some(double) = self.double_sided.get_mut(face.index()) {
+            *double = false;
+        }
     }
 
     /// Flips `e`, with the creases around it.

@@ -658,14 +658,14 @@ fn tiny_components_go_where_they_may<S: EdgeStore>() {
     }
 }
 
-/// A sheet cut in the middle but for both ends, the cut 1e-4 wide, so that it has two boundary loops.
-/// Three triangles are the fewest around two loops; where the cut may close, two. (It closes so late
-/// because a loop must have come down to three edges first.)
+/// A sheet cut in the middle but near both ends, the cut 1e-4 wide, so that it has two boundary loops.
+/// Where the topology may change it is closed long before it stands in the way; where it may not,
+/// three triangles are the fewest around two loops.
 fn a_hairline_gap_closes_where_it_may<S: EdgeStore>() {
     let n = 24u32;
     let (mut positions, mut triangles) = bumpy(n);
     let mut across = std::collections::BTreeMap::new();
-    for v in (1..n).map(|y| y * (n + 1) + n / 2) {
+    for v in (2..n - 1).map(|y| y * (n + 1) + n / 2) {
         across.insert(v, positions.len() as u32);
         positions.push(positions[v as usize] + 1e-4 * Vec3::X);
     }
@@ -675,30 +675,31 @@ fn a_hairline_gap_closes_where_it_may<S: EdgeStore>() {
     }
     let original = mesh((positions, triangles));
     let before = info(original.clone(), true).unwrap();
-    let sides = (4 * n + 2 * n) as usize;
+    let sides = (4 * n + 2 * (n - 2)) as usize;
     assert_eq!((before.boundary_loops, before.boundary_edges), (2, sides));
     for quality in QUALITIES {
-        let run = |topology| {
+        let run = |topology, wanted| {
             let options = Options {
                 topology,
-                ..to_triangles_in(quality, 2)
+                ..to_triangles_in(quality, wanted)
             };
             let (small, report) = decimate(original.clone(), &tiered::<S>(options)).unwrap();
             (info(small, true).unwrap(), report)
         };
-        let (kept, report) = run(Topology::Preserve);
+        let (kept, report) = run(Topology::Preserve, 2);
         assert_eq!(kept.boundary_loops, 2, "{quality:?}");
         assert!(report.stopped_short, "{quality:?}");
-        let (closed, report) = run(Topology::Simplify);
-        assert_eq!(
-            (closed.boundary_loops, closed.boundary_edges),
-            (1, 4),
-            "{quality:?}"
-        );
-        assert!(
-            report.tally.contractions > 0 && !report.stopped_short,
-            "{quality:?}"
-        );
+        // Fast remembers where the boundaries were, and pays for leaving them: it closes late.
+        let late = quality == Quality::Fast;
+        for wanted in if late { vec![2] } else { vec![500, 2] } {
+            let (closed, report) = run(Topology::Simplify, wanted);
+            assert_eq!(closed.boundary_loops, 1, "{quality:?} {wanted}");
+            assert!(
+                late || report.tally.filled_faces >= 10,
+                "{quality:?}: {report:?}"
+            );
+            assert!(!report.stopped_short, "{quality:?} {wanted}");
+        }
     }
 }
 

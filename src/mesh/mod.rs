@@ -16,6 +16,7 @@ mod check;
 mod collapse;
 mod compact;
 mod contract;
+mod fill;
 mod flip;
 mod ids;
 mod link;

@@ -662,6 +662,46 @@ fn a_component_is_removed_alone<S: EdgeStore>() {
     }
 }
 
+/// Faces put between boundary edges at random, among collapses: every table stays what a rebuild
+/// gives, each takes one boundary edge away, and nothing becomes less manifold.
+fn filling_makes_nothing_worse<S: EdgeStore>() {
+    let mut fills = 0;
+    for seed in 0..200 {
+        let (vertices, triangles) = random_surface(seed);
+        let mut mesh = Mesh::<S>::from_triangles(vertices, &triangles);
+        let mut random = Random(seed + 1);
+        let mut dead = Vec::new();
+        for _ in 0..60 {
+            let edges = live_edges(&mesh);
+            let e = edges[random.below(edges.len())];
+            if let (Some(_), Some(&face)) = (mesh.fill_condition(e), dead.last()) {
+                let count = |m: &Mesh<S>| {
+                    let boundary = live_edges(m).into_iter().filter(|&e| m.is_boundary(e));
+                    (
+                        boundary.count(),
+                        m.non_manifold_edge_count(),
+                        m.multi_fan_vertex_count(),
+                    )
+                };
+                let before = count(&mesh);
+                mesh.fill(e, face);
+                mesh.check()
+                    .unwrap_or_else(|w| panic!("seed {seed}, {e:?}: {w}"));
+                assert_eq!(
+                    count(&mesh),
+                    (before.0 - 1, before.1, before.2),
+                    "seed {seed}"
+                );
+                dead.pop();
+                fills += 1;
+            } else if mesh.link_condition(e) {
+                dead.extend(mesh.collapse(e).dead_faces);
+            }
+        }
+    }
+    assert!(fills > 100, "{fills}");
+}
+
 fn handle_loops<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId) -> Vec<[EdgeId; 3]> {
     let mut loops = mesh.open_loops(e).to_vec();
     loops.retain(|edges| mesh.is_around_handle(edges));
@@ -717,6 +757,7 @@ fn a_neck_is_no_handle<S: EdgeStore>() {
 }
 
 for_each_tier!(
+    filling_makes_nothing_worse,
     pinching_a_torus_leaves_a_sphere,
     a_neck_is_no_handle,
     a_component_is_removed_alone,

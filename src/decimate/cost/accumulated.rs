@@ -136,7 +136,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         changed.push(kept);
     }
 
-    fn after_pinch(
+    fn after_change(
         &mut self,
         _: &Surface<S>,
         cut: [[VertexId; 2]; 3],

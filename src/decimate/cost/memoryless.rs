@@ -267,7 +267,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         });
     }
 
-    fn after_pinch(
+    fn after_change(
         &mut self,
         surface: &Surface<S>,
         cut: [[VertexId; 2]; 3],

@@ -39,9 +39,10 @@ pub trait Cost<S: EdgeStore>: Sync {
         changed: &mut Vec<VertexId>,
     );
 
-    /// Gives each second vertex the state of the first, from which it was cut, brings all of them up
-    /// to date, and lists the vertices whose edges cost something else now.
-    fn after_pinch(
+    /// Gives each second vertex the state of the first, from which it was cut (or which it is, where
+    /// faces alone changed), brings all of them up to date, and lists the vertices whose edges cost
+    /// something else now.
+    fn after_change(
         &mut self,
         surface: &Surface<S>,
         cut: [[VertexId; 2]; 3],

@@ -1,0 +1,52 @@
+//! A face between two boundary edges that meet: a step towards closing a gap.
+
+use super::link::{Opposite, Outgoing};
+use super::{EdgeId, EdgeStore, FaceId, Mesh, VertexId};
+
+impl<S: EdgeStore> Mesh<S> {
+    /// The boundary edge behind `e`, where a face between both makes nothing less manifold: no edge
+    /// joins their far ends yet, and all three vertices lie on one boundary only.
+    ///
+    /// Costs a walk around three vertices.
+    pub fn fill_condition(&self, e: EdgeId) -> Option<EdgeId> {
+        if !self.is_boundary(e) {
+            return None;
+        }
+        let next = self.next_on_boundary(e)?;
+        let (a, v, b) = (self.tail(e), self.head(e), self.head(next));
+        let is_on_one = |x: VertexId| match self.outgoing(x) {
+            Outgoing::Fan(start) => {
+                self.is_boundary(start) && self.is_boundary(self.fan_end(start))
+            }
+            _ => false,
+        };
+        let may =
+            a != b && [a, v, b].into_iter().all(is_on_one) && !self.neighbours(a).any(|x| x == b);
+        may.then_some(next)
+    }
+
+    /// Puts the dead `face` between the boundary edge `e` and the one behind it.
+    ///
+    /// ```text
+    ///        v                  v
+    ///      ↗   ↘              ↗ | ↘        the face v a b; its edge a→b is boundary
+    ///     a     b     →      a ──→ b
+    /// ```
+    ///
+    /// Needs [`fill_condition(e)`](Self::fill_condition). Constant time.
+    pub fn fill(&mut self, e: EdgeId, face: FaceId) {
+        let next = self.next_on_boundary(e).expect("a boundary edge behind");
+        let (a, v, b) = (self.tail(e), self.head(e), self.head(next));
+        let [to_a, to_b, to_v] = face.edges();
+        for (edge, tail) in [(to_a, v), (to_b, a), (to_v, b)] {
+            self.store.set_tail(edge, tail);
+        }
+        for (edge, across) in [(to_a, e), (to_v, next)] {
+            self.set_opposite(edge, Opposite::Edge(across));
+            self.set_opposite(across, Opposite::Edge(edge));
+        }
+        self.set_opposite(to_b, Opposite::Boundary);
+        self.set_outgoing(a, Outgoing::Fan(to_b));
+        self.live_faces += 1;
+    }
+}
