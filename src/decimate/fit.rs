@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::original::{Original, centroids};
 use super::surface::Surface;
+use super::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, FaceId, Opposite, Outgoing, VertexId};
 use crate::nearest::{Foot, Triangles, foot_on_triangle};
 
@@ -790,7 +791,7 @@ impl Curve {
 /// The normal equations of a vertex's step.
 #[derive(Default)]
 struct System {
-    m: [f64; 6],
+    m: Symmetric,
     b: DVec3,
     weight: f64,
 }
@@ -800,41 +801,16 @@ impl System {
     /// `direction`.
     #[inline(always)]
     fn add(&mut self, direction: DVec3, offset: DVec3, share: f64, weight: f64) {
-        let u = direction;
-        let w = weight * share * share;
-        self.weight += w;
-        self.b += u * (weight * share * offset.dot(u));
-        let s = u * w;
-        let terms = [
-            s.x * u.x,
-            s.x * u.y,
-            s.x * u.z,
-            s.y * u.y,
-            s.y * u.z,
-            s.z * u.z,
-        ];
-        for (m, t) in self.m.iter_mut().zip(terms) {
-            *m += t;
-        }
+        let squared_share = weight * share * share;
+        self.weight += squared_share;
+        self.b += direction * (weight * share * offset.dot(direction));
+        self.m.add_outer(direction, squared_share);
     }
 
-    /// The step, by L D Lᵀ.
+    /// The step.
     fn solve(&self) -> Option<DVec3> {
-        let ridge = RIDGE * self.weight;
-        let [xx, xy, xz, yy, yz, zz] = self.m;
-        let d0 = xx + ridge;
-        let (l10, l20) = (xy / d0, xz / d0);
-        let d1 = yy + ridge - l10 * xy;
-        let s21 = yz - l20 * xy;
-        let l21 = s21 / d1;
-        let d2 = zz + ridge - l20 * xz - l21 * s21;
-        let y = self.b.y - l10 * self.b.x;
-        let z = self.b.z - l20 * self.b.x - l21 * y;
-        let step_z = z / d2;
-        let step_y = y / d1 - l21 * step_z;
-        let step_x = self.b.x / d0 - l10 * step_y - l20 * step_z;
-        let step = DVec3::new(step_x, step_y, step_z);
-        (self.weight > 0.0 && step.is_finite()).then_some(step)
+        let step = Factor::of(&self.m, RIDGE * self.weight)?.solve(self.b);
+        step.is_finite().then_some(step)
     }
 }
 

@@ -11,6 +11,7 @@ mod queue;
 mod report;
 mod rules;
 mod surface;
+mod symmetric;
 
 use std::ops::ControlFlow;
 use std::time::Instant;

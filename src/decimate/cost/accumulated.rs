@@ -4,10 +4,10 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::symmetric::Symmetric;
 use super::{BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight};
 use crate::decimate::options::{Boundary, Placement};
 use crate::decimate::surface::{Merged, Surface};
+use crate::decimate::symmetric::Symmetric;
 use crate::mesh::{Collapse, EdgeId, EdgeStore, Opposite, VertexId};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with

@@ -7,10 +7,10 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::symmetric::{Factor, Symmetric};
 use super::{BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight};
 use crate::decimate::options::{Boundary, Placement};
 use crate::decimate::surface::{Merged, Surface};
+use crate::decimate::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
 /// The weight of a fold. Without it a thin double sheet is free to eat: one mesh 1.68 → 0.91 of the

@@ -4,7 +4,6 @@
 
 mod accumulated;
 mod memoryless;
-mod symmetric;
 
 pub use accumulated::Accumulated;
 pub use memoryless::Memoryless;
@@ -13,8 +12,8 @@ use glam::{DVec3, Vec3};
 
 use super::options::{Boundary, Placement};
 use super::surface::{Merged, Surface};
+use super::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, VertexId};
-use symmetric::{Factor, Symmetric};
 
 /// A collapse's cost, in the unit box, and where its vertex goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
