@@ -12,11 +12,12 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::cost::{BOUNDARY_WEIGHT, LINE_WEIGHT};
 use super::original::{Original, centroids};
 use super::surface::Surface;
 use super::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, FaceId, Opposite, Outgoing, VertexId};
-use crate::nearest::{Foot, Triangles, foot_on_triangle};
+use crate::nearest::{Foot, Triangles, foot_on_triangle, nearest_on_triangle};
 
 /// A step may raise the largest distance around it up to this many times the rms of the whole: high
 /// enough not to hinder, low enough to keep the Hausdorff distance. 3 costs 4 % of rms; from 8 on
@@ -57,9 +58,6 @@ const TURN: f64 = 0.5;
 /// A step may not make a face thinner than this (twice its area against its longest squared side),
 /// if it makes it thinner at all.
 const THIN: f64 = 1e-3;
-
-/// The weight of boundary against surface, as in the cost.
-const BOUNDARY_WEIGHT: f64 = 18.0;
 
 /// Squared distances: their weighted sum, and the largest.
 #[derive(Clone, Copy, Debug, Default)]
@@ -293,8 +291,7 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
                 .filter(|&i| i < self.original.boundary_begin)
             {
                 let (point, weight) = self.sample(i);
-                let foot = foot_on_triangle(point, &triangle).point;
-                sum += weight * foot.distance_squared(point);
+                sum += weight * squared_distance(point, &triangle);
                 weights += weight;
             }
             let weight = area(&triangle) * self.scale() * self.scale();
@@ -555,10 +552,8 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
             for i in self.lists.on(f) {
                 has_boundary |= i >= self.original.boundary_begin;
                 let (point, weight) = self.sample(i);
-                let squared =
-                    |t: &[DVec3; 3]| foot_on_triangle(point, t).point.distance_squared(point);
-                before.add(squared(&old[k]), weight);
-                let [to_first, to_second] = [squared(&new[0]), squared(&new[1])];
+                before.add(squared_distance(point, &old[k]), weight);
+                let [to_first, to_second] = [0, 1].map(|k| squared_distance(point, &new[k]));
                 after.add(to_first.min(to_second), weight);
                 items.push(Item {
                     sample: i,
@@ -621,11 +616,7 @@ impl<'a, S: EdgeStore> Fit<'a, S> {
             let mut on_face = self.to_original[f.index()].largest;
             for i in self.lists.on(f) {
                 let (point, _) = self.sample(i);
-                on_face = on_face.max(
-                    foot_on_triangle(point, &triangle)
-                        .point
-                        .distance_squared(point),
-                );
+                on_face = on_face.max(squared_distance(point, &triangle));
             }
             for v in mesh.face_vertices(f) {
                 largest[v.index()] = largest[v.index()].max(on_face);
@@ -747,7 +738,7 @@ impl Curve {
         Self {
             ends,
             fixed: fixed.filter(|(_, is)| **is).map(|(rim, _)| *rim).collect(),
-            weight: BOUNDARY_WEIGHT * length * scale / 2.0,
+            weight: LINE_WEIGHT * BOUNDARY_WEIGHT * length * scale / 2.0,
             scale,
         }
     }
@@ -849,6 +840,10 @@ fn measure_items(star: &mut Star, there: DVec3) -> Measure {
         star.landed.push(face);
     }
     measure
+}
+
+fn squared_distance(point: DVec3, triangle: &[DVec3; 3]) -> f64 {
+    nearest_on_triangle(point, triangle).distance_squared(point)
 }
 
 fn area(&[a, b, c]: &[DVec3; 3]) -> f64 {

@@ -10,7 +10,7 @@ use super::options::Topology;
 use super::queue::{Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
 use super::rules;
-use super::surface::{Merged, Surface};
+use super::surface::{Loss, Merged, Surface};
 use crate::error::{Error, Result};
 use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, VertexId};
 
@@ -41,15 +41,13 @@ enum Rejection {
 /// How a candidate is collapsed.
 enum Way {
     Collapse,
-    Contract(Contraction),
+    Contract(Contraction, Loss),
 }
 
 /// A part of the surface that hangs together with nothing else.
 struct Component {
     /// What it costs to remove it.
-    price: f32,
-    /// Its diagonal, in the unit box.
-    diagonal: f64,
+    loss: Loss,
     /// Its faces at the start.
     faces: Vec<FaceId>,
 }
@@ -162,7 +160,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             if self
                 .components
                 .last()
-                .is_some_and(|c| c.price < candidate.cost)
+                .is_some_and(|c| c.loss.price < candidate.cost)
             {
                 self.queue.push(candidate);
                 self.remove_component();
@@ -186,9 +184,8 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 }
                 Err(Rejection::Flip) => self.tally.rejected_flip += 1,
                 Err(Rejection::Error) => self.tally.rejected_error += 1,
-                Ok(way) if self.loss(&way).0 > candidate.cost => {
-                    let price = f64::from(self.loss(&way).0);
-                    self.queue.push(self.candidate_at(e, price));
+                Ok(Way::Contract(_, loss)) if loss.price > candidate.cost => {
+                    self.queue.push(self.candidate_at(e, loss.price.into()));
                 }
                 Ok(way) => {
                     let merged = self.collapse(e, position, &way);
@@ -232,10 +229,19 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         Some(self.candidate_at(edge, cheaper.reduce(f64::min)?))
     }
 
+    /// Whether the topology may change here: not where creases are to be kept.
+    fn may_simplify(&self) -> bool {
+        self.topology == Topology::Simplify && self.surface.creases.is_empty()
+    }
+
+    /// Whether the largest error leaves room for a loss.
+    fn is_within_error(&self, loss: Loss) -> bool {
+        self.stop.max_error.is_none_or(|limit| loss.reach <= limit)
+    }
+
     /// What closing the gap at the head of a boundary edge costs, where the topology may change.
     fn fill_price(&self, e: EdgeId) -> Option<f64> {
-        let may = self.topology == Topology::Simplify && self.surface.creases.is_empty();
-        if may {
+        if self.may_simplify() {
             self.surface.fill_price(e)
         } else {
             None
@@ -269,7 +275,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         let way = if mesh.link_condition(e) && self.surface.crease_condition(e) {
             Way::Collapse
         } else {
-            Way::Contract(self.contraction(e).ok_or(Rejection::Link)?)
+            self.contraction(e).ok_or(Rejection::Link)?
         };
         if rules::turns_a_face(mesh, &self.surface.geometry, e, position) {
             Err(Rejection::Flip)
@@ -284,30 +290,17 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
     }
 
-    /// The contraction of `e`, where the topology may change and there are no creases to keep; none
-    /// that would leave nothing.
-    fn contraction(&self, e: EdgeId) -> Option<Contraction> {
-        if self.topology == Topology::Preserve || !self.surface.creases.is_empty() {
+    /// The contraction of `e`, where the topology may change; none that would leave nothing.
+    fn contraction(&self, e: EdgeId) -> Option<Way> {
+        if !self.may_simplify() {
             return None;
         }
         let contraction = self.surface.mesh.contraction(e)?;
         let dead = contraction.dead_faces().iter();
         let dead: usize = dead.map(|&f| self.surface.sides(f)).sum();
-        let (_, diagonal) = self.surface.extent(contraction.vanishing_faces());
-        let is_lost = !contraction.vanishing_faces().is_empty()
-            && self.stop.max_error.is_some_and(|limit| diagonal > limit);
-        (dead < self.triangles && !is_lost).then_some(contraction)
-    }
-
-    /// What vanishes in a way: its price, as that of a component, and its diagonal.
-    fn loss(&self, way: &Way) -> (f32, f64) {
-        match way {
-            Way::Contract(contraction) if !contraction.vanishing_faces().is_empty() => {
-                let (area, diagonal) = self.surface.extent(contraction.vanishing_faces());
-                ((area * diagonal * diagonal) as f32, diagonal)
-            }
-            _ => (0.0, 0.0),
-        }
+        let loss = self.surface.loss(contraction.vanishing_faces());
+        let may = dead < self.triangles && self.is_within_error(loss);
+        may.then_some(Way::Contract(contraction, loss))
     }
 
     /// Removes the cheapest component, unless that would overshoot the target or the error.
@@ -318,7 +311,6 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         let mut faces = component.faces;
         faces.retain(|&f| self.surface.mesh.is_live_face(f));
         let triangles: usize = faces.iter().map(|&f| self.surface.sides(f)).sum();
-        let limit = self.stop.max_error.unwrap_or(f64::INFINITY);
         let has_locked = |f: &FaceId| {
             let vertices = self.surface.mesh.face_vertices(*f);
             vertices.into_iter().any(|v| self.surface.is_locked(v))
@@ -326,11 +318,11 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         let is_allowed = !faces.is_empty()
             && triangles < self.triangles
             && self.triangles + 1 >= self.stop.triangles + triangles
-            && component.diagonal <= limit
+            && self.is_within_error(component.loss)
             && !faces.iter().any(has_locked);
         if is_allowed {
             self.surface.mesh.remove_component(&faces);
-            self.surface.lost = self.surface.lost.max(component.diagonal);
+            self.surface.lost = self.surface.lost.max(component.loss.reach);
             self.triangles -= triangles;
             self.tally.removed_components += 1;
         }
@@ -348,12 +340,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             self.waiting.push(e);
             return false;
         };
-        let mesh = &self.surface.mesh;
-        let Some(next) = mesh.next_on_boundary(e) else {
-            return false;
-        };
-        let around = [mesh.tail(e), mesh.head(e), mesh.head(next)];
-        self.surface.fill(e, face);
+        let around = self.surface.fill(e, face);
         self.free_faces.pop();
         self.triangles += 1;
         self.tally.filled_faces += 1;
@@ -366,62 +353,46 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     /// Where a handle stands in the way of a candidate, pinches it off if that costs no more than the
     /// candidate does; else the candidate waits until its turn comes at that price.
     fn pinch(&mut self, candidate: &Candidate, changed: &mut Vec<VertexId>) {
-        let is_allowed = self.topology == Topology::Simplify
-            && self.surface.creases.is_empty()
-            && self.cost.moves_vertices();
-        let (2.., 3..) = (self.free_faces.len(), self.free_vertices.len()) else {
+        let ([.., a, b], [.., x, y, z]) = (&self.free_faces[..], &self.free_vertices[..]) else {
             return;
         };
-        if !is_allowed {
+        if !self.may_simplify() || !self.cost.moves_vertices() {
             return;
         }
         let mesh = &self.surface.mesh;
         let is_free =
             |edges: &&[EdgeId; 3]| !edges.iter().any(|&e| self.surface.is_locked(mesh.tail(e)));
         let loops = mesh.open_loops(candidate.edge);
-        let prices = loops.iter().filter(is_free);
-        let Some((price, &edges)) = prices
-            .map(|edges| (self.surface.pinch_price(edges) as f32, edges))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
+        let losses = loops.iter().filter(is_free);
+        let Some((loss, &edges)) = losses
+            .map(|edges| (self.surface.pinch_loss(edges), edges))
+            .min_by(|a, b| a.0.price.total_cmp(&b.0.price))
         else {
             return;
         };
-        let longest_side = |e: EdgeId| {
-            let [a, b] = mesh.edge_vertices(e);
-            self.surface.geometry.between(a, b).length()
-        };
-        let reach = edges.map(longest_side).into_iter().fold(0.0, f64::max);
-        if self.stop.max_error.is_some_and(|limit| reach > limit) {
+        if !self.is_within_error(loss) {
             return;
         }
-        if price > candidate.cost {
-            let waiting = Candidate {
-                cost: price,
-                evaluated_at: self.tally.collapses as u32,
-                ..*candidate
-            };
-            self.queue.push(waiting);
+        if loss.price > candidate.cost {
+            self.queue
+                .push(self.candidate_at(candidate.edge, loss.price.into()));
             return;
         }
         if !mesh.is_around_handle(&edges) {
             return;
         }
-        let tails = edges.map(|e| mesh.tail(e));
-        let [.., a, b] = self.free_faces[..] else {
-            return;
-        };
-        let [.., x, y, z] = self.free_vertices[..] else {
-            return;
-        };
-        if self.surface.pinch(&edges, [a, b], [x, y, z]).is_none() {
+        let [u, v, w] = edges.map(|e| mesh.tail(e));
+        let (caps, vertices) = ([*a, *b], [*x, *y, *z]);
+        if self.surface.pinch(&edges, caps, vertices).is_none() {
             return;
         }
         self.free_faces.truncate(self.free_faces.len() - 2);
         self.free_vertices.truncate(self.free_vertices.len() - 3);
-        self.surface.lost = self.surface.lost.max(reach);
+        self.surface.lost = self.surface.lost.max(loss.reach);
         self.triangles += 2;
         self.tally.pinched_handles += 1;
-        let cut = [[tails[0], x], [tails[1], y], [tails[2], z]];
+        let [x, y, z] = vertices;
+        let cut = [[u, x], [v, y], [w, z]];
         self.cost.after_change(self.surface, cut, changed);
         self.reconsider(changed);
     }
@@ -437,10 +408,12 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
         let contraction = match way {
             Way::Collapse => None,
-            Way::Contract(contraction) => Some(contraction),
+            Way::Contract(contraction, loss) => {
+                self.tally.contractions += 1;
+                self.surface.lost = self.surface.lost.max(loss.reach);
+                Some(contraction)
+            }
         };
-        self.tally.contractions += usize::from(contraction.is_some());
-        self.surface.lost = self.surface.lost.max(self.loss(way).1);
         let merged = self.surface.collapse(e, position, contraction);
         if self.topology == Topology::Simplify {
             self.free_faces.extend(&merged.collapse.dead_faces);
@@ -558,25 +531,18 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
 }
 
 /// The components of a surface by what removing them costs, the cheapest last and the dearest, which
-/// stays, left out: area times squared diagonal, as if all of it went that far.
+/// stays, left out.
 fn removable<S: EdgeStore>(surface: &Surface<S>) -> Vec<Component> {
-    let mut components: Vec<Component> = surface
-        .mesh
-        .components()
-        .into_iter()
-        .map(|faces| {
-            let (area, diagonal) = surface.extent(&faces);
-            Component {
-                price: (area * diagonal * diagonal) as f32,
-                diagonal,
-                faces,
-            }
+    let components = surface.mesh.components().into_iter();
+    let mut components: Vec<Component> = components
+        .map(|faces| Component {
+            loss: surface.loss(&faces),
+            faces,
         })
         .collect();
     components.sort_by(|a, b| {
-        b.price
-            .total_cmp(&a.price)
-            .then(a.faces[0].cmp(&b.faces[0]))
+        let by_price = b.loss.price.total_cmp(&a.loss.price);
+        by_price.then(a.faces[0].cmp(&b.faces[0]))
     });
     if !components.is_empty() {
         components.remove(0);

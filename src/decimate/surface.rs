@@ -17,6 +17,15 @@ pub struct Merged {
     pub around: Vec<VertexId>,
 }
 
+/// What a change of the topology costs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Loss {
+    /// As the cost of a collapse.
+    pub price: f32,
+    /// How far from the original it may leave something, in the unit box.
+    pub reach: f64,
+}
+
 /// A mesh being decimated and all that is carried along by its slots.
 pub struct Surface<S> {
     /// Which triangles meet where.
@@ -119,6 +128,11 @@ impl<S: EdgeStore> Surface<S> {
         self.creases.get(e.index()) == Some(&true)
     }
 
+    /// Whether the edge is a crease, a boundary or non-manifold.
+    fn is_curve(&self, e: EdgeId) -> bool {
+        self.is_crease(e) || self.mesh.mate(e).is_none()
+    }
+
     /// Marks the edges at which the surface turns by more than `degrees` as creases.
     pub fn mark_creases(&mut self, degrees: f64) {
         let (mesh, geometry) = (&self.mesh, &self.geometry);
@@ -140,12 +154,8 @@ impl<S: EdgeStore> Surface<S> {
     /// How many edges at `v` are creases, boundaries or non-manifold: 0 on a smooth piece, 2 on a
     /// curve, anything else where curves end or meet.
     pub fn curves_at(&self, v: VertexId) -> usize {
-        let is_curve = |&e: &EdgeId| self.is_crease(e) || self.mesh.mate(e).is_none();
-        self.mesh
-            .vertex_edges(v)
-            .iter()
-            .filter(|e| is_curve(e))
-            .count()
+        let edges = self.mesh.vertex_edges(v);
+        edges.into_iter().filter(|&e| self.is_curve(e)).count()
     }
 
     /// Which ends of `e` stay where they are if it collapses, tail first.
@@ -153,8 +163,7 @@ impl<S: EdgeStore> Surface<S> {
         let ends = self.mesh.edge_vertices(e);
         let mut held = ends.map(|v| self.is_locked(v));
         if !self.creases.is_empty() {
-            let is_curve = self.is_crease(e) || self.mesh.mate(e).is_none();
-            let free = if is_curve { 2 } else { 0 };
+            let free = if self.is_curve(e) { 2 } else { 0 };
             for (held, v) in held.iter_mut().zip(ends) {
                 *held |= self.curves_at(v) != free;
             }
@@ -168,9 +177,8 @@ impl<S: EdgeStore> Surface<S> {
         if self.creases.is_empty() {
             return true;
         }
-        let is_curve = |e: EdgeId| self.is_crease(e) || self.mesh.mate(e).is_none();
         let mut star = self.mesh.edge_star(e).into_iter();
-        !star.any(|d| is_curve(self.mesh.next(d)) && is_curve(self.mesh.prev(d)))
+        !star.any(|d| self.is_curve(self.mesh.next(d)) && self.is_curve(self.mesh.prev(d)))
     }
 
     /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried; by a
@@ -229,13 +237,16 @@ impl<S: EdgeStore> Surface<S> {
 
     /// What pinching the loop costs: the two caps' area times the squared length of the longest side,
     /// as if all of both were that far from the original.
-    pub fn pinch_price(&self, edges: &[EdgeId; 3]) -> f64 {
+    pub fn pinch_loss(&self, edges: &[EdgeId; 3]) -> Loss {
         let [a, b, c] = edges.map(|e| self.geometry.vector(Vec3::ZERO, self.mesh.tail(e)));
         let longest = (b - a)
             .length_squared()
             .max((c - b).length_squared())
             .max((a - c).length_squared());
-        (b - a).cross(c - a).length() * longest
+        Loss {
+            price: ((b - a).cross(c - a).length() * longest) as f32,
+            reach: longest.sqrt(),
+        }
     }
 
     /// Cuts along a loop and caps both sides; the right one takes the dead `caps` and `vertices`, a
@@ -250,17 +261,10 @@ impl<S: EdgeStore> Surface<S> {
         const APART: f64 = 1e-3;
         let tails = edges.map(|e| self.mesh.tail(e));
         let mut places = [Vec3::ZERO; 3];
-        for i in 0..3 {
+        for (i, leaving) in self.mesh.right_of_loop(edges).iter().enumerate() {
             let here = self.geometry.position(tails[i]);
-            let end = edges[i];
-            let mut at = self.mesh.mate(edges[(i + 2) % 3]);
-            let (mut sum, mut count) = (DVec3::ZERO, 0);
-            while let Some(e) = at.filter(|&e| e != end) {
-                sum += self.geometry.position(self.mesh.apex(e)).as_dvec3();
-                count += 1;
-                at = self.mesh.mate(self.mesh.prev(e));
-            }
-            let mean = sum / f64::from(count);
+            let at = |&e: &EdgeId| self.geometry.position(self.mesh.apex(e)).as_dvec3();
+            let mean = leaving.iter().map(at).sum::<DVec3>() / leaving.len() as f64;
             places[i] = (here.as_dvec3() + (mean - here.as_dvec3()) * APART).as_vec3();
             if places[i] == here || !places[i].is_finite() {
                 return None;
@@ -301,10 +305,10 @@ impl<S: EdgeStore> Surface<S> {
         may.then_some(normal.length() / 2.0 * width * width)
     }
 
-    /// Puts the dead `face` between the boundary edge `e` and the one behind it.
-    pub fn fill(&mut self, e: EdgeId, face: FaceId) {
-        self.mesh.fill(e, face);
+    /// Puts the dead `face` between the boundary edge `e` and the one behind it; its vertices.
+    pub fn fill(&mut self, e: EdgeId, face: FaceId) -> [VertexId; 3] {
         self.revive(face, e.face());
+        self.mesh.fill(e, face)
     }
 
     /// Gives a face that was dead what `beside` carries.
@@ -345,8 +349,12 @@ impl<S: EdgeStore> Surface<S> {
         f64::from(deviations.fold(0.0, f32::max)).max(self.lost)
     }
 
-    /// The area of these faces and the diagonal of the box around them, in the unit box.
-    pub fn extent(&self, faces: &[FaceId]) -> (f64, f64) {
+    /// What it costs that these faces go without a trace: their area times the squared diagonal of
+    /// the box around them, as if all of it went that far.
+    pub fn loss(&self, faces: &[FaceId]) -> Loss {
+        if faces.is_empty() {
+            return Loss::default();
+        }
         let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let mut area = 0.0;
         for f in faces {
@@ -357,7 +365,11 @@ impl<S: EdgeStore> Surface<S> {
             }
         }
         let diagonal = (max.as_dvec3() - min.as_dvec3()) * self.geometry.scale();
-        (area, diagonal.length())
+        let reach = diagonal.length();
+        Loss {
+            price: (area * reach * reach) as f32,
+            reach,
+        }
     }
 
     /// The bytes of connectivity and positions.

@@ -66,7 +66,7 @@ impl<S: EdgeStore> Mesh<S> {
     /// What contracting `e` would do, where [`link_condition(e)`](Self::link_condition) forbids to
     /// collapse it: the faces at `e` go; of two faces that come to lie on each other one goes, or
     /// both where no other face is at one of their edges; edges that come to lie on each other become
-    /// one. Nothing where an edge or a vertex would become non-manifold (or more so), or an edge would become a
+    /// one. Nothing where an edge or a vertex would become non-manifold (or more so), or an edge a
     /// boundary.
     ///
     /// Costs a walk around both ends and around all of their neighbours.
@@ -275,55 +275,6 @@ impl<S: EdgeStore> Mesh<S> {
             dead_faces: SmallVec::from_slice(dead),
             merged_edges: SmallVec::new(),
         }
-    }
-}
-
-impl<S: EdgeStore> Mesh<S> {
-    /// The faces that hang together, through vertices, component by component.
-    pub fn components(&self) -> Vec<Vec<FaceId>> {
-        let mut seen = vec![false; self.face_slots()];
-        let mut components = Vec::new();
-        for f in self.faces() {
-            if !seen[f.index()] {
-                components.push(self.flood(f, |g| !std::mem::replace(&mut seen[g.index()], true)));
-            }
-        }
-        components
-    }
-
-    /// The faces that hang together with `f`; `is_new` says of each once that it is.
-    fn flood(&self, f: FaceId, mut is_new: impl FnMut(FaceId) -> bool) -> Vec<FaceId> {
-        is_new(f);
-        let mut component = vec![f];
-        let mut at = 0;
-        while let Some(&f) = component.get(at) {
-            at += 1;
-            for v in self.face_vertices(f) {
-                component.extend(self.vertex_faces(v).filter(|&g| is_new(g)));
-            }
-        }
-        component
-    }
-
-    /// Removes faces that hang together with no others.
-    pub fn remove_component(&mut self, faces: &[FaceId]) {
-        for e in faces.iter().flat_map(|f| f.edges()) {
-            let v = self.tail(e);
-            if let Outgoing::Fans(row) = self.outgoing(v) {
-                self.fan_rows.remove(row);
-            }
-            self.live_vertices -= usize::from(self.outgoing(v) != Outgoing::None);
-            self.set_outgoing(v, Outgoing::None);
-            if let Opposite::NonManifold(row) = self.opposite(e) {
-                for e in self.edge_rows.remove(row) {
-                    self.set_opposite(e, Opposite::Boundary);
-                }
-            }
-        }
-        for e in faces.iter().flat_map(|f| f.edges()) {
-            self.store.set_opposite_word(e, OppositeWord::DEAD);
-        }
-        self.live_faces -= faces.len();
     }
 }
 

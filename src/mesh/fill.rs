@@ -33,8 +33,8 @@ impl<S: EdgeStore> Mesh<S> {
     ///     a     b     →      a ──→ b
     /// ```
     ///
-    /// Needs [`fill_condition(e)`](Self::fill_condition). Constant time.
-    pub fn fill(&mut self, e: EdgeId, face: FaceId) {
+    /// Returns a, v and b. Needs [`fill_condition(e)`](Self::fill_condition). Costs a walk around v.
+    pub fn fill(&mut self, e: EdgeId, face: FaceId) -> [VertexId; 3] {
         let next = self.next_on_boundary(e).expect("a boundary edge behind");
         let (a, v, b) = (self.tail(e), self.head(e), self.head(next));
         let [to_a, to_b, to_v] = face.edges();
@@ -48,5 +48,6 @@ impl<S: EdgeStore> Mesh<S> {
         self.set_opposite(to_b, Opposite::Boundary);
         self.set_outgoing(a, Outgoing::Fan(to_b));
         self.live_faces += 1;
+        [a, v, b]
     }
 }

@@ -15,6 +15,7 @@ mod build;
 mod check;
 mod collapse;
 mod compact;
+mod components;
 mod contract;
 mod fill;
 mod flip;

@@ -74,6 +74,21 @@ impl<S: EdgeStore> Mesh<S> {
         false
     }
 
+    /// The edges that leave each vertex of a loop on its right: from the mate of the edge that comes
+    /// in to the one that goes out.
+    pub fn right_of_loop(&self, edges: &[EdgeId; 3]) -> [Vec<EdgeId>; 3] {
+        let mate = |e| self.mate(e).expect("a disk around each vertex of the loop");
+        std::array::from_fn(|i| {
+            let mut at = mate(edges[(i + 2) % 3]);
+            let mut leaving = Vec::new();
+            while at != edges[i] {
+                leaving.push(at);
+                at = mate(self.prev(at));
+            }
+            leaving
+        })
+    }
+
     /// Cuts along a loop and caps both sides, the right one on three new vertices.
     ///
     /// ```text
@@ -89,18 +104,7 @@ impl<S: EdgeStore> Mesh<S> {
     /// vertices (for the tails of the edges, in order). Costs a walk around the three vertices.
     pub fn pinch(&mut self, edges: &[EdgeId; 3], caps: [FaceId; 2], vertices: [VertexId; 3]) {
         let mates = edges.map(|e| self.mate(e).expect("a loop of manifold edges"));
-        // The edges that leave each vertex on the right: from the mate of the edge that comes in to
-        // the one that goes out.
-        let right: [Vec<EdgeId>; 3] = std::array::from_fn(|i| {
-            let (first, end) = (mates[(i + 2) % 3], edges[i]);
-            let mut at = first;
-            let mut leaving = Vec::new();
-            while at != end {
-                leaving.push(at);
-                at = self.mate(self.prev(at)).expect("a disk around each vertex");
-            }
-            leaving
-        });
+        let right = self.right_of_loop(edges);
         let tails = edges.map(|e| self.tail(e));
         for (i, leaving) in right.iter().enumerate() {
             for &e in leaving {

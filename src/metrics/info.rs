@@ -101,7 +101,7 @@ pub(super) fn info_of_clean(
     }
     let (boundary_edges, boundary_loops) = (boundary.len(), loops.closed());
     let non_manifold_edges = mesh.non_manifold_edge_count() - mesh.same_way_pair_count();
-    let components = components(&mesh);
+    let components = mesh.components().len();
     let euler_characteristic = mesh.vertex_count() as i64 - edges as i64 + mesh.face_count() as i64;
     let is_manifold = non_manifold_edges == 0 && non_manifold_vertices == 0;
     // χ = 2·components − 2·genus − loops.
@@ -235,23 +235,6 @@ fn root(parent: &mut [usize], mut i: usize) -> usize {
         i = parent[i];
     }
     i
-}
-
-/// The number of pieces joined through shared vertices.
-fn components<S: EdgeStore>(mesh: &Mesh<S>) -> usize {
-    let mut parent: Vec<usize> = (0..mesh.vertex_slots()).collect();
-    let mut pieces = mesh.vertex_count();
-    for f in mesh.faces() {
-        let [a, b, c] = mesh.face_vertices(f).map(VertexId::index);
-        for (v, w) in [(a, b), (b, c)] {
-            let (v, w) = (root(&mut parent, v), root(&mut parent, w));
-            if v != w {
-                parent[v.max(w)] = v.min(w);
-                pieces -= 1;
-            }
-        }
-    }
-    pieces
 }
 
 #[cfg(test)]

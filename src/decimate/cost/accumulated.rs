@@ -4,11 +4,13 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight};
+use super::{
+    BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
+};
 use crate::decimate::options::{Boundary, Placement};
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
-use crate::mesh::{Collapse, EdgeId, EdgeStore, Opposite, VertexId};
+use crate::mesh::{Collapse, EdgeId, EdgeStore, VertexId};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
 /// y from the vertex, where single precision has all its digits. 40 bytes.
@@ -63,17 +65,14 @@ fn quadric_at<S: EdgeStore>(surface: &Surface<S>, v: VertexId, boundary_weight: 
     let (mesh, geometry) = (&surface.mesh, &surface.geometry);
     let point = geometry.position(v);
     let mut a = Symmetric::default();
-    let line = |e: EdgeId, along: DVec3| {
-        let weight = match mesh.opposite(e) {
-            Opposite::Edge(_) if surface.is_crease(e) => BOUNDARY_WEIGHT / 2.0,
-            Opposite::Edge(_) => return Symmetric::default(),
-            Opposite::Boundary => boundary_weight,
-            Opposite::NonManifold(_) if mesh.canonical(e) == e => BOUNDARY_WEIGHT,
-            Opposite::NonManifold(_) => return Symmetric::default(),
-        };
-        let mut line = Symmetric::default();
-        line.add_line(along, LINE_WEIGHT * weight);
-        line
+    let add_line = |a: &mut Symmetric, e: EdgeId, along: DVec3| {
+        // A crease is met from both of its faces.
+        let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
+        if let Some(weight) = of_crease.or_else(|| singular_weight(mesh, e, boundary_weight)) {
+            let mut line = Symmetric::default();
+            line.add_line(along, LINE_WEIGHT * weight);
+            *a = a.plus(line);
+        }
     };
     for e in mesh.outgoing_edges(v) {
         let (to_head, to_apex) = (
@@ -85,7 +84,8 @@ fn quadric_at<S: EdgeStore>(surface: &Surface<S>, v: VertexId, boundary_weight: 
         if length > 0.0 {
             a.add_outer(normal, 0.5 / length);
         }
-        a = a.plus(line(e, to_head)).plus(line(mesh.prev(e), to_apex));
+        add_line(&mut a, e, to_head);
+        add_line(&mut a, mesh.prev(e), to_apex);
     }
     let weight = surface.weight(v);
     Quadric {

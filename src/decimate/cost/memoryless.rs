@@ -7,7 +7,9 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight};
+use super::{
+    BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
+};
 use crate::decimate::options::{Boundary, Placement};
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::{Factor, Symmetric};
@@ -41,6 +43,7 @@ impl Tensor {
         let trace = now.quadratic[0] + now.quadratic[3] + now.quadratic[5];
         xx + yy + zz + 2.0 * (xy + xz + yz) > CHANGE * trace
     }
+
     fn area(&self) -> DVec3 {
         Vec3::from(self.area).as_dvec3()
     }
@@ -160,13 +163,9 @@ impl Memoryless {
         e: EdgeId,
         along: DVec3,
     ) {
-        let weight = match mesh.opposite(e) {
-            Opposite::Edge(_) => return,
-            Opposite::Boundary => self.boundary_weight,
-            Opposite::NonManifold(_) if mesh.canonical(e) == e => BOUNDARY_WEIGHT,
-            Opposite::NonManifold(_) => return,
-        };
-        quadratic.add_line(along, LINE_WEIGHT * weight);
+        if let Some(weight) = singular_weight(mesh, e, self.boundary_weight) {
+            quadratic.add_line(along, LINE_WEIGHT * weight);
+        }
     }
 
     fn refresh<S: EdgeStore>(&mut self, surface: &Surface<S>, v: VertexId) {
@@ -246,24 +245,20 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             changed[1..].sort_unstable();
             changed.dedup();
         }
-        let mut is_first = true;
-        changed.retain(|x| {
-            let lag = &mut self.lag[x.index()];
-            let waits = lag.left > 0 && !is_first;
-            lag.left -= u16::from(waits);
-            is_first = false;
-            !waits
-        });
         let is_exact = surface.mesh.face_count() < EXACT_BELOW;
-        is_first = true;
+        let mut is_first = true;
         changed.retain(|&x| {
-            let before = self.tensors[x.index()];
-            if !is_first {
-                self.refresh(surface, x);
+            if std::mem::take(&mut is_first) {
+                return true;
             }
-            let changed = is_exact || is_first || before.differs_from(&self.tensors[x.index()]);
-            is_first = false;
-            changed
+            let lag = &mut self.lag[x.index()];
+            if lag.left > 0 {
+                lag.left -= 1;
+                return false;
+            }
+            let before = self.tensors[x.index()];
+            self.refresh(surface, x);
+            is_exact || before.differs_from(&self.tensors[x.index()])
         });
     }
 

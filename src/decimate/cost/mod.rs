@@ -13,7 +13,7 @@ use glam::{DVec3, Vec3};
 use super::options::{Boundary, Placement};
 use super::surface::{Merged, Surface};
 use super::symmetric::{Factor, Symmetric};
-use crate::mesh::{EdgeId, EdgeStore, VertexId};
+use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
 /// A collapse's cost, in the unit box, and where its vertex goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,11 +61,11 @@ pub trait Cost<S: EdgeStore>: Sync {
 
 /// The weight of lines against planes: Lindstrom & Turk's ½ for boundaries and ⅓·⅓ for volume
 /// bring lengths and areas to one scale; measured with it, 1 to 4 make no difference.
-const LINE_WEIGHT: f64 = 2.25;
+pub(super) const LINE_WEIGHT: f64 = 2.25;
 
 /// The weight of a boundary edge. 1 ties Lindstrom & Turk on the boundary; 16 makes the boundary's
 /// error 2 to 6 times smaller for 0 to 4 % of surface rms.
-const BOUNDARY_WEIGHT: f64 = 8.0;
+pub(super) const BOUNDARY_WEIGHT: f64 = 8.0;
 
 /// The ridge against singular tensors, relative to the trace. Larger ones cost rms on CAD parts.
 const RIDGE: f64 = 1e-8;
@@ -85,6 +85,17 @@ fn boundary_weight(boundary: Boundary) -> f64 {
     match boundary {
         Boundary::Keep | Boundary::Lock => BOUNDARY_WEIGHT,
         Boundary::Free => 0.0,
+    }
+}
+
+/// The weight of the line of a boundary or non-manifold edge; of the latter once, where its first
+/// directed edge stands, since it ends several fans.
+#[inline]
+fn singular_weight<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId, boundary_weight: f64) -> Option<f64> {
+    match mesh.opposite(e) {
+        Opposite::Edge(_) => None,
+        Opposite::Boundary => Some(boundary_weight),
+        Opposite::NonManifold(_) => (mesh.canonical(e) == e).then_some(BOUNDARY_WEIGHT),
     }
 }
 
