@@ -9,10 +9,9 @@ use super::cost::{Cost, Evaluation};
 use super::options::Topology;
 use super::queue::{Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
-use super::rules;
 use super::surface::{Loss, Merged, Surface};
 use crate::error::{Error, Result};
-use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, VertexId};
+use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -21,14 +20,32 @@ pub struct Stop {
     pub triangles: usize,
     /// Before an estimated error above this, in the unit box.
     pub max_error: Option<f64>,
+    /// Before a cost above this.
+    pub max_cost: f32,
+}
+
+/// Why the loop came to a halt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Halt {
+    /// The number of triangles is reached.
+    Target,
+    /// What is left costs too much.
+    Cost,
+    /// No candidate is left.
+    Empty,
+    /// The caller asked to stop.
+    Cancelled,
 }
 
 /// The faces whose edges are evaluated at a time, in parallel.
 const BLOCK_FACES: usize = 1 << 16;
 
+/// The faces whose edges are worth a thread.
+const PART_FACES: usize = 1 << 10;
+
 /// A candidate that costs this many times what it did waits for its new turn. 1 to 1.15 differ by
 /// chance alone.
-const RISE: f32 = 1.1;
+const RISE: f32 = 1.05;
 
 /// Why a candidate cannot be collapsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,12 +70,14 @@ struct Component {
 }
 
 /// A surface being decimated under one cost.
-pub struct Greedy<'a, S, C, Q> {
-    surface: &'a mut Surface<S>,
+pub struct Greedy<S: EdgeStore, C: Cost<S>> {
+    surface: Surface<S>,
     cost: C,
-    queue: Q,
+    queue: C::Queue,
     /// The number of collapses before each vertex's surroundings last changed.
     changed_at: Vec<u32>,
+    /// The vertices whose surroundings changed last; kept for its memory.
+    changed: Vec<VertexId>,
     /// The edges to evaluate after a collapse; kept for its memory.
     edges: Vec<EdgeId>,
     triangles: usize,
@@ -74,25 +93,25 @@ pub struct Greedy<'a, S, C, Q> {
     tally: Tally,
 }
 
-impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
+impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
     /// Evaluates every edge, in parallel. Counting goes on from `tally`.
-    pub fn new(surface: &'a mut Surface<S>, cost: C, topology: Topology, tally: Tally) -> Self {
-        let slots = surface.mesh.vertex_slots();
-        let triangles = surface.triangles();
+    pub fn new(surface: Surface<S>, cost: C, topology: Topology, tally: Tally) -> Self {
         let mut greedy = Self {
             cost,
-            queue: Q::from_candidates(Vec::new()),
-            changed_at: vec![0; slots],
+            queue: C::Queue::for_edges(3 * surface.mesh.face_slots()),
+            changed_at: vec![0; surface.mesh.vertex_slots()],
+            changed: Vec::new(),
             edges: Vec::new(),
-            triangles,
+            triangles: surface.triangles(),
             stop: Stop {
                 triangles: 0,
                 max_error: None,
+                max_cost: f32::INFINITY,
             },
             topology,
             components: match topology {
                 Topology::Preserve => Vec::new(),
-                Topology::Simplify => removable(surface),
+                Topology::Simplify => removable(&surface),
             },
             surface,
             free_faces: Vec::new(),
@@ -100,30 +119,42 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             waiting: Vec::new(),
             tally,
         };
-        greedy.tally.rejected_lock = greedy.locked_edges();
-        greedy.queue = Q::from_candidates(greedy.candidates(|_| true));
+        greedy.tally.rejected_lock += greedy.locked_edges();
+        greedy.queue_all(|_, _| true);
         greedy
     }
 
-    /// The candidates of all edges that `choose` takes, in parallel.
-    fn candidates(&self, choose: impl Fn(&Candidate) -> bool + Sync) -> Vec<Candidate> {
-        let mesh = &self.surface.mesh;
+    /// Queues every edge that `choose` takes; evaluated in parallel. Whether there is one.
+    fn queue_all(&mut self, choose: impl Fn(&Self, &Candidate) -> bool + Sync) -> bool {
+        let slots = self.surface.mesh.face_slots();
+        let candidates_of = |greedy: &Self, f: FaceId, to: &mut Vec<Candidate>| {
+            let mesh = &greedy.surface.mesh;
+            if mesh.is_live_face(f) {
+                let names = f.edges().into_iter().filter(|&e| mesh.canonical(e) == e);
+                let candidates = names.filter_map(|e| greedy.candidate(e));
+                to.extend(candidates.filter(|c| choose(greedy, c)));
+            }
+        };
+        let mut is_any = false;
         // In blocks, so that no second copy of all candidates is held.
-        let mut candidates: Vec<Candidate> = Vec::with_capacity(3 * mesh.face_count() / 2);
-        let slots = mesh.face_slots();
         for first in (0..slots).step_by(BLOCK_FACES) {
-            let block: Vec<Candidate> = (first..slots.min(first + BLOCK_FACES))
+            let block = first..slots.min(first + BLOCK_FACES);
+            let greedy = &*self;
+            let parts: Vec<Vec<Candidate>> = block
                 .into_par_iter()
+                .with_min_len(PART_FACES)
                 .map(FaceId::new)
-                .filter(|&f| mesh.is_live_face(f))
-                .flat_map_iter(|f| f.edges().into_iter())
-                .filter(|&e| mesh.canonical(e) == e)
-                .filter_map(|e| self.candidate(e))
-                .filter(&choose)
+                .fold(Vec::new, |mut part, f| {
+                    candidates_of(greedy, f, &mut part);
+                    part
+                })
                 .collect();
-            candidates.extend(block);
+            for candidate in parts.into_iter().flatten() {
+                is_any = true;
+                self.queue.push(candidate);
+            }
         }
-        candidates
+        is_any
     }
 
     /// Collapses until a target is reached or nothing is left to collapse.
@@ -139,22 +170,44 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         check: bool,
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<(StopReason, Option<Blocked>)> {
+        loop {
+            match self.advance(stop, check, progress)? {
+                Halt::Target => return Ok((StopReason::Target, None)),
+                Halt::Cancelled => return Ok((StopReason::Cancelled, None)),
+                Halt::Empty | Halt::Cost => {}
+            }
+            if !self.revive() {
+                if self.components.is_empty() {
+                    return Ok(self.blocked());
+                }
+                self.remove_component();
+            }
+        }
+    }
+
+    /// Collapses until a target is reached or no candidate is left.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn advance(
+        &mut self,
+        stop: Stop,
+        check: bool,
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Halt> {
         self.stop = stop;
         let exact_below = self.cost.exact_below();
-        let mut changed = Vec::new();
         self.note_bytes();
         while self.triangles > stop.triangles {
             let Some(candidate) = self.queue.pop() else {
-                if self.revive() {
-                    continue;
-                }
-                if !self.components.is_empty() {
-                    self.remove_component();
-                    continue;
-                }
-                return Ok(self.blocked());
+                return Ok(Halt::Empty);
             };
-            if !self.is_fresh(&candidate) {
+            if candidate.cost > stop.max_cost {
+                self.queue.push(candidate);
+                return Ok(Halt::Cost);
+            }
+            let e = candidate.edge;
+            if !self.surface.mesh.is_live_face(e.face()) || self.goes_by_another_name(e) {
                 continue;
             }
             if self
@@ -166,52 +219,52 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 self.remove_component();
                 continue;
             }
-            let e = candidate.edge;
-            if self.fill(&candidate, &mut changed) {
+            if self.fill(&candidate) {
                 continue;
             }
             let Some(Evaluation { cost, position }) = self.evaluate(e) else {
                 continue;
             };
             if cost as f32 > candidate.cost * RISE {
-                self.queue.push(self.candidate_at(e, cost));
+                self.queue_at(e, cost);
                 continue;
             }
             match self.way(e, position) {
                 Err(Rejection::Link) => {
                     self.tally.rejected_link += 1;
-                    self.pinch(&candidate, &mut changed);
+                    self.pinch(&candidate);
                 }
                 Err(Rejection::Flip) => self.tally.rejected_flip += 1,
                 Err(Rejection::Error) => self.tally.rejected_error += 1,
-                Ok(Way::Contract(_, loss)) if loss.price > candidate.cost => {
-                    self.queue.push(self.candidate_at(e, loss.price.into()));
+                Ok((Way::Contract(_, loss), _)) if loss.price > candidate.cost => {
+                    self.queue_at(e, loss.price.into());
                 }
-                Ok(way) => {
-                    let merged = self.collapse(e, position, &way);
+                Ok((way, deviation)) => {
+                    let merged = self.collapse(e, position, &way, deviation);
                     if check {
                         self.surface.mesh.check().map_err(|wrong| {
                             Error::Internal(format!("after {:?}: {wrong}", merged.collapse))
                         })?;
                     }
                     self.cost
-                        .after_collapse(self.surface, &merged, &mut changed);
+                        .after_collapse(&self.surface, &merged, &mut self.changed);
                     let faces = self.surface.mesh.face_count();
                     let faces_before = faces + merged.collapse.dead_faces.len();
                     if faces < exact_below && faces_before >= exact_below {
-                        self.queue = Q::from_candidates(self.candidates(|_| true));
+                        self.queue_all(|_, _| true);
                     } else {
-                        self.reconsider(&changed);
+                        self.reconsider(C::MAY_FALL);
                     }
                     if self.tally.collapses.is_multiple_of(1024)
                         && progress(self.triangles).is_break()
                     {
-                        return Ok((StopReason::Cancelled, None));
+                        return Ok(Halt::Cancelled);
                     }
                 }
             }
         }
-        Ok((StopReason::Target, None))
+        self.note_bytes();
+        Ok(Halt::Target)
     }
 
     /// What was counted so far.
@@ -219,14 +272,25 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         self.tally
     }
 
+    /// The triangles left, double-sided ones counted as two.
+    pub fn triangles(&self) -> usize {
+        self.triangles
+    }
+
+    /// The surface, what its cost model knows, and what was counted.
+    pub fn into_parts(self) -> (Surface<S>, C, Tally) {
+        (self.surface, self.cost, self.tally)
+    }
+
     fn evaluate(&self, e: EdgeId) -> Option<Evaluation> {
-        self.cost.evaluate(self.surface, e, self.surface.held(e))
+        self.cost.evaluate(&self.surface, e, self.surface.held(e))
     }
 
     fn candidate(&self, edge: EdgeId) -> Option<Candidate> {
         let cost = self.evaluate(edge).map(|evaluation| evaluation.cost);
         let cheaper = cost.into_iter().chain(self.fill_price(edge));
-        Some(self.candidate_at(edge, cheaper.reduce(f64::min)?))
+        let cost = cheaper.reduce(f64::min)? as f32;
+        Some(Candidate { cost, edge })
     }
 
     /// Whether the topology may change here: not where creases are to be kept.
@@ -248,45 +312,47 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         }
     }
 
-    fn candidate_at(&self, edge: EdgeId, cost: f64) -> Candidate {
-        Candidate {
-            cost: cost as f32,
-            edge,
-            evaluated_at: self.tally.collapses as u32,
-        }
+    fn queue_at(&mut self, edge: EdgeId, cost: f64) {
+        let cost = cost as f32;
+        self.queue.push(Candidate { cost, edge });
     }
 
-    /// Whether nothing around the edge has changed since it was evaluated.
-    fn is_fresh(&self, candidate: &Candidate) -> bool {
-        let e = candidate.edge;
-        let unchanged = |v: VertexId| self.changed_at[v.index()] <= candidate.evaluated_at;
-        self.surface.mesh.is_live_face(e.face())
-            && self
-                .surface
-                .mesh
-                .edge_vertices(e)
-                .into_iter()
-                .all(unchanged)
+    /// Whether `e` is not the name of its edge, and the edge has a candidate by its name: its costs
+    /// are followed there.
+    #[inline]
+    fn goes_by_another_name(&self, e: EdgeId) -> bool {
+        let name = self.surface.mesh.canonical(e);
+        name != e && self.queue.contains(name)
     }
 
-    /// How `e` can be collapsed to `position`, or why it cannot.
-    fn way(&self, e: EdgeId, position: Vec3) -> std::result::Result<Way, Rejection> {
+    /// Whether the edge has a candidate, by whatever name.
+    #[inline]
+    fn is_queued(&self, e: EdgeId) -> bool {
+        self.queue.contains(e)
+            || match self.surface.mesh.opposite(e) {
+                Opposite::Edge(o) => self.queue.contains(o),
+                Opposite::Boundary => false,
+                Opposite::NonManifold(_) => self.queue.contains(self.surface.mesh.canonical(e)),
+            }
+    }
+
+    /// How `e` can be collapsed to `position` and the deviation after it, or why it cannot.
+    #[inline]
+    fn way(&self, e: EdgeId, position: Vec3) -> std::result::Result<(Way, f64), Rejection> {
         let mesh = &self.surface.mesh;
         let way = if mesh.link_condition(e) && self.surface.crease_condition(e) {
             Way::Collapse
         } else {
             self.contraction(e).ok_or(Rejection::Link)?
         };
-        if rules::turns_a_face(mesh, &self.surface.geometry, e, position) {
-            Err(Rejection::Flip)
-        } else if self
-            .stop
-            .max_error
-            .is_some_and(|limit| self.surface.deviation_after(e, position) > limit)
-        {
+        let deviation = self
+            .surface
+            .deviation_after(e, position)
+            .ok_or(Rejection::Flip)?;
+        if self.stop.max_error.is_some_and(|limit| deviation > limit) {
             Err(Rejection::Error)
         } else {
-            Ok(way)
+            Ok((way, deviation))
         }
     }
 
@@ -330,7 +396,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
 
     /// Closes the gap at the head of a boundary edge by one face, where that costs no more than the
     /// candidate. Whether it did.
-    fn fill(&mut self, candidate: &Candidate, changed: &mut Vec<VertexId>) -> bool {
+    fn fill(&mut self, candidate: &Candidate) -> bool {
         let e = candidate.edge;
         let price = self.fill_price(e).map(|price| price as f32);
         if price.is_none_or(|price| price > candidate.cost) {
@@ -345,14 +411,14 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         self.triangles += 1;
         self.tally.filled_faces += 1;
         self.cost
-            .after_change(self.surface, around.map(|v| [v, v]), changed);
-        self.reconsider(changed);
+            .after_change(&self.surface, around.map(|v| [v, v]), &mut self.changed);
+        self.reconsider(true);
         true
     }
 
     /// Where a handle stands in the way of a candidate, pinches it off if that costs no more than the
     /// candidate does; else the candidate waits until its turn comes at that price.
-    fn pinch(&mut self, candidate: &Candidate, changed: &mut Vec<VertexId>) {
+    fn pinch(&mut self, candidate: &Candidate) {
         let ([.., a, b], [.., x, y, z]) = (&self.free_faces[..], &self.free_vertices[..]) else {
             return;
         };
@@ -374,8 +440,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             return;
         }
         if loss.price > candidate.cost {
-            self.queue
-                .push(self.candidate_at(candidate.edge, loss.price.into()));
+            self.queue_at(candidate.edge, loss.price.into());
             return;
         }
         if !mesh.is_around_handle(&edges) {
@@ -393,15 +458,15 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         self.tally.pinched_handles += 1;
         let [x, y, z] = vertices;
         let cut = [[u, x], [v, y], [w, z]];
-        self.cost.after_change(self.surface, cut, changed);
-        self.reconsider(changed);
+        self.cost
+            .after_change(&self.surface, cut, &mut self.changed);
+        self.reconsider(true);
     }
 
-    fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way) -> Merged {
+    fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f64) -> Merged {
         let mesh = &self.surface.mesh;
         let ends = mesh.edge_vertices(e);
-        let star = mesh.edge_star(e);
-        let apexes = star.iter().map(|&d| mesh.apex(d));
+        let apexes = mesh.edge_star(e).into_iter().map(|d| mesh.apex(d));
         let mut touched = ends.into_iter().chain(apexes);
         if touched.any(|v| mesh.is_non_manifold_vertex(v)) {
             self.tally.collapses_non_manifold += 1;
@@ -414,7 +479,7 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
                 Some(contraction)
             }
         };
-        let merged = self.surface.collapse(e, position, contraction);
+        let merged = self.surface.collapse(e, position, contraction, deviation);
         if self.topology == Topology::Simplify {
             self.free_faces.extend(&merged.collapse.dead_faces);
             self.free_vertices.push(merged.collapse.removed);
@@ -431,15 +496,15 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
         merged
     }
 
-    /// Evaluates every edge at the changed vertices, each once.
-    fn reconsider(&mut self, changed: &[VertexId]) {
+    /// Evaluates the edges at the changed vertices, each once: `all`, or those without a candidate.
+    fn reconsider(&mut self, all: bool) {
         let now = self.tally.collapses as u32;
-        for &v in changed {
+        for &v in &self.changed {
             self.changed_at[v.index()] = now;
         }
         let mut edges = std::mem::take(&mut self.edges);
         edges.clear();
-        for &v in changed {
+        for &v in &self.changed {
             for start in self.surface.mesh.fans(v) {
                 let mut end = start;
                 for e in self.surface.mesh.fan(start) {
@@ -452,18 +517,13 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
             }
         }
         for &e in &edges {
-            if let Some(candidate) = self.candidate(e) {
+            if (all || !self.is_queued(e))
+                && let Some(candidate) = self.candidate(e)
+            {
                 self.queue.push(candidate);
             }
         }
         self.edges = edges;
-        // Stale candidates stay in the queue until they outnumber the fresh ones.
-        if self.queue.len() > 3 * self.surface.mesh.face_count() + 1024 {
-            self.note_bytes();
-            let mut queue = std::mem::replace(&mut self.queue, Q::from_candidates(Vec::new()));
-            queue.retain(|candidate| self.is_fresh(candidate));
-            self.queue = queue;
-        }
     }
 
     /// The name of the edge from the changed vertex `v` to `other`, unless it is `other`'s turn (both
@@ -478,12 +538,11 @@ impl<'a, S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<'a, S, C, Q> {
     /// Puts what can be collapsed after all back into the queue: what was refused once and has not
     /// been evaluated since, because no cost around it changed. Whether there is anything.
     fn revive(&mut self) -> bool {
-        let can_collapse = |c: &Candidate| {
-            self.evaluate(c.edge)
-                .is_some_and(|e| self.way(c.edge, e.position).is_ok())
-        };
-        self.queue = Q::from_candidates(self.candidates(can_collapse));
-        self.queue.len() > 0
+        self.queue_all(|greedy, c| {
+            greedy
+                .evaluate(c.edge)
+                .is_some_and(|e| greedy.way(c.edge, e.position).is_ok())
+        })
     }
 
     /// Why nothing is left to collapse: the reason of every edge that is left.

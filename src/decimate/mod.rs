@@ -30,7 +30,6 @@ use fit::Fit;
 use geometry::Geometry;
 use greedy::{Greedy, Stop};
 use original::Original;
-use queue::LazyHeap;
 use surface::Surface;
 
 /// How far decimation has come.
@@ -171,6 +170,7 @@ fn run<S: EdgeStore>(
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),
+        max_cost: f32::INFINITY,
     };
     let triangles_start = surface.triangles();
     let triangles_target = stop.triangles.min(triangles_start);
@@ -185,14 +185,10 @@ fn run<S: EdgeStore>(
             })
         },
     };
-    let (reason, blocked) = match options.quality {
-        Quality::Fast => job.collapse(&mut surface, stop, |surface| {
-            Accumulated::new(surface, options.boundary, options.placement)
-        }),
-        Quality::Standard => job.collapse(&mut surface, stop, |surface| {
-            Memoryless::new(surface, options.boundary, options.placement)
-        }),
-        Quality::Best => job.collapse_and_fit(&mut surface, stop),
+    let (surface, (reason, blocked)) = match options.quality {
+        Quality::Fast => job.collapse::<S, Accumulated>(surface, stop),
+        Quality::Standard => job.collapse::<S, Memoryless>(surface, stop),
+        Quality::Best => job.collapse_and_fit(surface, stop),
     }?;
     report.tally = job.tally;
     report.max_error_estimate = surface.max_deviation() / scale;
@@ -242,40 +238,38 @@ impl Job<'_> {
     /// Collapses under one cost.
     fn collapse<S: EdgeStore, C: Cost<S>>(
         &mut self,
-        surface: &mut Surface<S>,
+        surface: Surface<S>,
         stop: Stop,
-        cost: impl FnOnce(&Surface<S>) -> C,
-    ) -> Result<Stopped> {
-        let cost = cost(surface);
-        let mut greedy =
-            Greedy::<_, _, LazyHeap>::new(surface, cost, self.options.topology, self.tally);
+    ) -> Result<(Surface<S>, Stopped)> {
+        let cost = C::new(&surface, self.options);
+        let mut greedy = Greedy::new(surface, cost, self.options.topology, self.tally);
         let stopped = greedy.run(stop, self.options.check, self.progress)?;
-        self.tally = greedy.tally();
-        Ok(stopped)
+        let (surface, _, tally) = greedy.into_parts();
+        self.tally = tally;
+        Ok((surface, stopped))
     }
 
     /// Collapses, and fits what is left to the original. Where an error stopped it, goes on with
     /// what was measured in the place of what was estimated.
     fn collapse_and_fit<S: EdgeStore>(
         &mut self,
-        surface: &mut Surface<S>,
+        mut surface: Surface<S>,
         stop: Stop,
-    ) -> Result<Stopped> {
+    ) -> Result<(Surface<S>, Stopped)> {
         let options = self.options;
         let with_boundary = options.boundary == Boundary::Keep;
-        let original = Original::new(surface, stop.triangles, with_boundary);
+        let original = Original::new(&surface, stop.triangles, with_boundary);
         loop {
             let triangles = surface.triangles();
-            let stopped = self.collapse(surface, stop, |surface| {
-                Memoryless::new(surface, options.boundary, options.placement)
-            })?;
+            let stopped;
+            (surface, stopped) = self.collapse::<S, Memoryless>(surface, stop)?;
             let is_untouched = surface.triangles() == triangles;
             if stopped.0 == StopReason::Cancelled || is_untouched {
-                return Ok(stopped);
+                return Ok((surface, stopped));
             }
             let is_light = surface.mesh.face_count() * LIGHT > original.faces.len();
             let sweeps = if is_light { SWEEPS - 1 } else { SWEEPS };
-            let mut fit = Fit::new(surface, &original, options.targets.max_error);
+            let mut fit = Fit::new(&mut surface, &original, options.targets.max_error);
             self.tally.working_bytes = self.tally.working_bytes.max(original.bytes() + fit.bytes());
             fit.flip_edges();
             if options.placement == Placement::Optimal {
@@ -288,7 +282,7 @@ impl Job<'_> {
             }
             let is_stuck = surface.triangles() as f64 > STUCK * triangles as f64;
             if stopped.0 != StopReason::MaxError || is_stuck {
-                return Ok(stopped);
+                return Ok((surface, stopped));
             }
         }
     }

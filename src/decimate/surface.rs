@@ -159,7 +159,11 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Which ends of `e` stay where they are if it collapses, tail first.
+    #[inline]
     pub fn held(&self, e: EdgeId) -> [bool; 2] {
+        if self.locked.is_empty() && self.creases.is_empty() {
+            return [false; 2];
+        }
         let ends = self.mesh.edge_vertices(e);
         let mut held = ends.map(|v| self.is_locked(v));
         if !self.creases.is_empty() {
@@ -182,26 +186,27 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried; by a
-    /// contraction, if one is given.
+    /// contraction, if one is given. `deviation` is what [`deviation_after`](Self::deviation_after)
+    /// said.
     pub fn collapse(
         &mut self,
         e: EdgeId,
         position: Vec3,
         contraction: Option<&Contraction>,
+        deviation: f64,
     ) -> Merged {
         let from = self
             .mesh
             .edge_vertices(e)
             .map(|v| self.geometry.position(v));
-        let deviation = self.deviation_after(e, position) as f32;
         let beside = |d: EdgeId| [self.mesh.next(d), self.mesh.prev(d)];
         let has_crease = |d: &EdgeId| beside(*d).into_iter().any(|e| self.is_crease(e));
-        let star = self.mesh.edge_star(e);
-        let creased: SmallVec<[FaceId; 2]> = star
-            .into_iter()
-            .filter(has_crease)
-            .map(EdgeId::face)
-            .collect();
+        let creased: SmallVec<[FaceId; 2]> = if self.creases.is_empty() {
+            SmallVec::new()
+        } else {
+            let star = self.mesh.edge_star(e).into_iter();
+            star.filter(has_crease).map(EdgeId::face).collect()
+        };
         let (collapse, around) = match contraction {
             None => (self.mesh.collapse(e), Vec::new()),
             Some(contraction) => (
@@ -227,7 +232,7 @@ impl<S: EdgeStore> Surface<S> {
                 }
             }
         }
-        self.deviation[collapse.kept.index()] = deviation;
+        self.deviation[collapse.kept.index()] = deviation as f32;
         Merged {
             collapse,
             from,
@@ -333,14 +338,17 @@ impl<S: EdgeStore> Surface<S> {
         }
     }
 
-    /// The deviation that the merged vertex would have: a memoryless cost forgets, so each vertex
-    /// carries the sum of what its collapses moved away from the planes at hand.
-    pub fn deviation_after(&self, e: EdgeId, position: Vec3) -> f64 {
+    /// The deviation that the merged vertex would have, or nothing where a face would turn: a
+    /// memoryless cost forgets, so each vertex carries the sum of what its collapses moved away from
+    /// the planes at hand.
+    #[inline]
+    pub fn deviation_after(&self, e: EdgeId, position: Vec3) -> Option<f64> {
         let [v, w] = self
             .mesh
             .edge_vertices(e)
             .map(|v| self.deviation[v.index()]);
-        f64::from(v.max(w)) + rules::distance_from_star(&self.mesh, &self.geometry, e, position)
+        let moved = rules::distance_from_star(&self.mesh, &self.geometry, e, position)?;
+        Some(f64::from(v.max(w)) + moved)
     }
 
     /// The largest estimated distance from the original, in the unit box.

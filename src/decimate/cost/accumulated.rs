@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
 };
-use crate::decimate::options::{Boundary, Placement};
+use crate::decimate::options::{Options, Placement};
+use crate::decimate::queue::Buckets;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
 use crate::mesh::{Collapse, EdgeId, EdgeStore, VertexId};
@@ -41,23 +42,6 @@ impl Quadric {
 pub struct Accumulated {
     quadrics: Vec<Quadric>,
     placement: Placement,
-}
-
-impl Accumulated {
-    /// The model's state for a mesh, computed in parallel: 40 bytes a vertex.
-    pub fn new<S: EdgeStore>(
-        surface: &Surface<S>,
-        boundary: Boundary,
-        placement: Placement,
-    ) -> Self {
-        let weight = boundary_weight(boundary);
-        let quadric = |v| quadric_at(surface, VertexId::new(v), weight);
-        let slots = surface.mesh.vertex_slots();
-        Self {
-            quadrics: (0..slots).into_par_iter().map(quadric).collect(),
-            placement,
-        }
-    }
 }
 
 /// The planes and lines at a vertex, all of which pass through it.
@@ -95,6 +79,20 @@ fn quadric_at<S: EdgeStore>(surface: &Surface<S>, v: VertexId, boundary_weight: 
 }
 
 impl<S: EdgeStore> Cost<S> for Accumulated {
+    const MAY_FALL: bool = false;
+
+    type Queue = Buckets;
+
+    fn new(surface: &Surface<S>, options: &Options) -> Self {
+        let weight = boundary_weight(options.boundary);
+        let quadric = |v| quadric_at(surface, VertexId::new(v), weight);
+        let slots = surface.mesh.vertex_slots();
+        Self {
+            quadrics: (0..slots).into_par_iter().map(quadric).collect(),
+            placement: options.placement,
+        }
+    }
+
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
         let ends = surface.mesh.edge_vertices(e);
         let [v, w] = ends;

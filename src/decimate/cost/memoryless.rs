@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
 };
-use crate::decimate::options::{Boundary, Placement};
+use crate::decimate::options::{Options, Placement};
+use crate::decimate::queue::Buckets;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
@@ -86,23 +87,6 @@ pub struct Memoryless {
 }
 
 impl Memoryless {
-    /// The model's state for a mesh, computed in parallel: 40 bytes a vertex.
-    pub fn new<S: EdgeStore>(
-        surface: &Surface<S>,
-        boundary: Boundary,
-        placement: Placement,
-    ) -> Self {
-        let slots = surface.mesh.vertex_slots();
-        let mut model = Self {
-            tensors: Vec::new(),
-            lag: Vec::new(),
-            boundary_weight: boundary_weight(boundary),
-            placement,
-        };
-        let tensor = |v| model.tensor(surface, VertexId::new(v));
-        (model.tensors, model.lag) = (0..slots).into_par_iter().map(tensor).unzip();
-        model
-    }
 
     /// The tensor of `v` from the faces around it now, and how far it may lag behind them.
     fn tensor<S: EdgeStore>(&self, surface: &Surface<S>, v: VertexId) -> (Tensor, Lag) {
@@ -194,6 +178,23 @@ fn add_fold(quadratic: &mut Symmetric, along: DVec3, a: Side, b: Side, is_crease
 }
 
 impl<S: EdgeStore> Cost<S> for Memoryless {
+    const MAY_FALL: bool = true;
+
+    type Queue = Buckets;
+
+    fn new(surface: &Surface<S>, options: &Options) -> Self {
+        let slots = surface.mesh.vertex_slots();
+        let mut model = Self {
+            tensors: Vec::new(),
+            lag: Vec::new(),
+            boundary_weight: boundary_weight(options.boundary),
+            placement: options.placement,
+        };
+        let tensor = |v| model.tensor(surface, VertexId::new(v));
+        (model.tensors, model.lag) = (0..slots).into_par_iter().map(tensor).unzip();
+        model
+    }
+
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
         let ends = surface.mesh.edge_vertices(e);
         let [at_v, at_w] = ends.map(|v| &self.tensors[v.index()]);

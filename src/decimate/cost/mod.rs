@@ -10,7 +10,8 @@ pub use memoryless::Memoryless;
 
 use glam::{DVec3, Vec3};
 
-use super::options::{Boundary, Placement};
+use super::options::{Boundary, Options, Placement};
+use super::queue::Queue;
 use super::surface::{Merged, Surface};
 use super::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
@@ -25,12 +26,21 @@ pub struct Evaluation {
 }
 
 /// A cost model: owns its state and follows the collapses.
-pub trait Cost<S: EdgeStore>: Sync {
+pub trait Cost<S: EdgeStore>: Send + Sync {
+    /// Whether a collapse can make what is left cheaper; else an old cost is a lower bound.
+    const MAY_FALL: bool;
+
+    /// What keeps the candidates in order.
+    type Queue: Queue;
+
+    /// The model's state for a surface, computed in parallel.
+    fn new(surface: &Surface<S>, options: &Options) -> Self;
+
     /// The collapse of `e` with its tail or head held in place; nothing where both are held.
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation>;
 
     /// Brings the state up to date after a collapse, and lists the vertices whose edges cost
-    /// something else now.
+    /// something else now; where costs never fall, the merged one alone.
     fn after_collapse(
         &mut self,
         surface: &Surface<S>,
