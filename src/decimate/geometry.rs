@@ -14,12 +14,9 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// The geometry of these positions, which span a box with this diagonal.
-    pub fn new(positions: Vec<Vec3>, diagonal: f64) -> Self {
-        Self {
-            positions,
-            scale: scale_to_unit(diagonal),
-        }
+    /// The geometry of these positions, at a scale.
+    pub fn new(positions: Vec<Vec3>, scale: f64) -> Self {
+        Self { positions, scale }
     }
 
     /// The stored position of `v`.
@@ -60,10 +57,16 @@ impl Geometry {
         self.vector(self.position(from), to)
     }
 
-    /// The stored position nearest to the middle of `v` and `w` plus a vector in the unit box.
-    pub fn point_near_middle(&self, v: VertexId, w: VertexId, offset: DVec3) -> Vec3 {
-        let middle = (self.position(v).as_dvec3() + self.position(w).as_dvec3()) * 0.5;
-        (middle + offset / self.scale).as_vec3()
+    /// The stored position nearest to `v` plus a vector in the unit box.
+    #[inline(always)]
+    pub fn point_near(&self, v: VertexId, offset: DVec3) -> Vec3 {
+        (self.position(v).as_dvec3() + offset * self.scale.recip()).as_vec3()
+    }
+
+    /// A difference of positions, in the unit box.
+    #[inline(always)]
+    pub fn scaled(&self, difference: Vec3) -> Vec3 {
+        difference * self.scale as f32
     }
 
     /// The normal of the face of `e`, twice its area long, in the unit box.
@@ -81,7 +84,7 @@ impl Geometry {
 }
 
 /// The power of two that brings a length into [0.5, 1); 1 for no length.
-fn scale_to_unit(length: f64) -> f64 {
+pub fn scale_to_unit(length: f64) -> f64 {
     if length > 0.0 && length.is_finite() {
         let exponent = (length.to_bits() >> 52) as i64 - 1022;
         f64::from_bits(((1023 - exponent) as u64) << 52)

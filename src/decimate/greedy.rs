@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::cost::{Cost, Evaluation};
 use super::options::Topology;
@@ -25,12 +26,12 @@ pub struct Stop {
 }
 
 /// Why the loop came to a halt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Halt {
     /// The number of triangles is reached.
     Target,
-    /// What is left costs too much.
-    Cost,
+    /// What is left costs this or more.
+    Cost(f32),
     /// No candidate is left.
     Empty,
     /// The caller asked to stop.
@@ -174,7 +175,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             match self.advance(stop, check, progress)? {
                 Halt::Target => return Ok((StopReason::Target, None)),
                 Halt::Cancelled => return Ok((StopReason::Cancelled, None)),
-                Halt::Empty | Halt::Cost => {}
+                Halt::Empty | Halt::Cost(_) => {}
             }
             if !self.revive() {
                 if self.components.is_empty() {
@@ -204,7 +205,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             };
             if candidate.cost > stop.max_cost {
                 self.queue.push(candidate);
-                return Ok(Halt::Cost);
+                return Ok(Halt::Cost(candidate.cost));
             }
             let e = candidate.edge;
             if !self.surface.mesh.is_live_face(e.face()) || self.goes_by_another_name(e) {
@@ -252,8 +253,10 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                     let faces_before = faces + merged.collapse.dead_faces.len();
                     if faces < exact_below && faces_before >= exact_below {
                         self.queue_all(|_, _| true);
+                    } else if C::MAY_FALL {
+                        self.reconsider();
                     } else {
-                        self.reconsider(C::MAY_FALL);
+                        self.complete(merged.collapse.kept);
                     }
                     if self.tally.collapses.is_multiple_of(1024)
                         && progress(self.triangles).is_break()
@@ -338,7 +341,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
 
     /// How `e` can be collapsed to `position` and the deviation after it, or why it cannot.
     #[inline]
-    fn way(&self, e: EdgeId, position: Vec3) -> std::result::Result<(Way, f64), Rejection> {
+    fn way(&self, e: EdgeId, position: Vec3) -> std::result::Result<(Way, f32), Rejection> {
         let mesh = &self.surface.mesh;
         let way = if mesh.link_condition(e) && self.surface.crease_condition(e) {
             Way::Collapse
@@ -349,7 +352,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             .surface
             .deviation_after(e, position)
             .ok_or(Rejection::Flip)?;
-        if self.stop.max_error.is_some_and(|limit| deviation > limit) {
+        if self.stop.max_error.is_some_and(|limit| f64::from(deviation) > limit) {
             Err(Rejection::Error)
         } else {
             Ok((way, deviation))
@@ -412,7 +415,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         self.tally.filled_faces += 1;
         self.cost
             .after_change(&self.surface, around.map(|v| [v, v]), &mut self.changed);
-        self.reconsider(true);
+        self.reconsider();
         true
     }
 
@@ -460,10 +463,10 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         let cut = [[u, x], [v, y], [w, z]];
         self.cost
             .after_change(&self.surface, cut, &mut self.changed);
-        self.reconsider(true);
+        self.reconsider();
     }
 
-    fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f64) -> Merged {
+    fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f32) -> Merged {
         let mesh = &self.surface.mesh;
         let ends = mesh.edge_vertices(e);
         let apexes = mesh.edge_star(e).into_iter().map(|d| mesh.apex(d));
@@ -496,8 +499,33 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         merged
     }
 
-    /// Evaluates the edges at the changed vertices, each once: `all`, or those without a candidate.
-    fn reconsider(&mut self, all: bool) {
+    /// Evaluates the edges at a vertex that have no candidate.
+    #[inline]
+    fn complete(&mut self, v: VertexId) {
+        let mut missing: SmallVec<[EdgeId; 4]> = SmallVec::new();
+        let mesh = &self.surface.mesh;
+        for start in mesh.fans(v) {
+            let mut end = start;
+            for e in mesh.fan(start) {
+                if !self.is_queued(e) {
+                    missing.push(e);
+                }
+                end = mesh.prev(e);
+            }
+            if mesh.mate(start).is_none() && !self.is_queued(end) {
+                missing.push(end);
+            }
+        }
+        for e in missing {
+            let name = self.surface.mesh.canonical(e);
+            if let Some(candidate) = self.candidate(name) {
+                self.queue.push(candidate);
+            }
+        }
+    }
+
+    /// Evaluates the edges at the changed vertices, each once.
+    fn reconsider(&mut self) {
         let now = self.tally.collapses as u32;
         for &v in &self.changed {
             self.changed_at[v.index()] = now;
@@ -517,9 +545,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             }
         }
         for &e in &edges {
-            if (all || !self.is_queued(e))
-                && let Some(candidate) = self.candidate(e)
-            {
+            if let Some(candidate) = self.candidate(e) {
                 self.queue.push(candidate);
             }
         }
@@ -572,7 +598,8 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
 
     /// The edges that no collapse is asked of, since both ends are held.
     fn locked_edges(&self) -> usize {
-        if self.surface.locked.is_empty() && self.surface.creases.is_empty() {
+        let nothing_is = self.surface.locked.is_empty() && self.surface.creases.is_empty();
+        if nothing_is || !self.surface.seam.is_empty() {
             return 0;
         }
         let is_held = |&e: &EdgeId| self.surface.held(e) == [true; 2];

@@ -1,7 +1,10 @@
 //! From one mesh to another with fewer triangles.
 
+mod chunked;
 mod cost;
+mod cut;
 mod fit;
+mod flat;
 mod geometry;
 mod greedy;
 mod memory;
@@ -18,16 +21,18 @@ use std::time::Instant;
 
 use crate::clean::{Cleaning, clean};
 use crate::error::{Error, Result};
-use crate::indexed_mesh::{IndexedMesh, Parts};
+use crate::indexed_mesh::IndexedMesh;
 use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
 pub use options::{Boundary, Options, Placement, Quality, Targets, TierChoice, Topology};
 pub use report::{Blocked, Report, StopReason, Tally};
 
+use chunked::Chunked;
 use cost::{Accumulated, Cost, Memoryless};
 use fit::Fit;
-use geometry::Geometry;
+use flat::Flat;
+use geometry::scale_to_unit;
 use greedy::{Greedy, Stop};
 use original::Original;
 use surface::Surface;
@@ -99,6 +104,10 @@ pub fn decimate_with_progress(
         tier,
         tier_reason,
         mesh_bytes: 0,
+        chunks: 0,
+        chunk_rounds: 0,
+        collapses_in_chunks: 0,
+        chunk_seconds: 0.0,
         read_seconds: 0.0,
         clean_seconds,
         build_seconds: 0.0,
@@ -106,11 +115,16 @@ pub fn decimate_with_progress(
         write_seconds: 0.0,
         peak_rss_bytes: None,
     };
-    let mesh = match tier {
-        Tier::Full => run::<Full>(mesh, options, &mut report, progress),
-        Tier::Medium => run::<Medium>(mesh, options, &mut report, progress),
-        Tier::Small => run::<Small>(mesh, options, &mut report, progress),
-    }?;
+    let is_fast = options.quality == Quality::Fast;
+    let run = match (tier, is_fast) {
+        (Tier::Full, true) => run::<Full, Accumulated>,
+        (Tier::Medium, true) => run::<Medium, Accumulated>,
+        (Tier::Small, true) => run::<Small, Accumulated>,
+        (Tier::Full, false) => run::<Full, Memoryless>,
+        (Tier::Medium, false) => run::<Medium, Memoryless>,
+        (Tier::Small, false) => run::<Small, Memoryless>,
+    };
+    let mesh = run(mesh, options, &mut report, progress)?;
     Ok((mesh, report))
 }
 
@@ -126,53 +140,23 @@ fn no_triangle_left(triangles_in: usize, cleaning: &Cleaning) -> Error {
     })
 }
 
-fn run<S: EdgeStore>(
+fn run<S: EdgeStore, C: Cost<S>>(
     input: IndexedMesh,
     options: &Options,
     report: &mut Report,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<IndexedMesh> {
     let start = Instant::now();
-    let diagonal = input.diagonal();
-    let Parts {
-        origin,
-        positions,
-        triangles,
-        double_sided,
-        weights,
-    } = input.into_parts();
-    let Oriented { mesh, flipped, .. } = Mesh::<S>::oriented(positions.len(), triangles);
-    let mut surface = Surface {
-        locked: Vec::new(),
-        creases: Vec::new(),
-        weights: Vec::new(),
-        deviation: vec![0.0; mesh.vertex_slots()],
-        lost: 0.0,
-        turned: flipped,
-        geometry: Geometry::new(positions, diagonal),
-        mesh,
-        double_sided,
-    };
-    report.mesh_bytes = surface.mesh_bytes();
-    report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
-    report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
-    report.build_seconds = start.elapsed().as_secs_f64();
-
-    let start = Instant::now();
-    surface.weigh(weights);
-    if options.boundary == Boundary::Lock {
-        surface.lock_boundary();
-    }
-    if let Some(degrees) = options.feature_angle_degrees {
-        surface.mark_creases(degrees);
-    }
-    let scale = surface.geometry.scale();
+    let scale = scale_to_unit(input.diagonal());
+    let parts = input.into_parts();
+    let origin = parts.origin;
+    let mut flat = Flat::<C::State>::of(parts);
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),
         max_cost: f32::INFINITY,
     };
-    let triangles_start = surface.triangles();
+    let triangles_start = flat.triangle_count();
     let triangles_target = stop.triangles.min(triangles_start);
     let mut job = Job {
         options,
@@ -185,9 +169,42 @@ fn run<S: EdgeStore>(
             })
         },
     };
+    if options.quality != Quality::Best {
+        let mut chunked = Chunked {
+            options,
+            stop,
+            scale,
+            progress: job.progress,
+        };
+        let done = chunked.reduce::<S, C>(&mut flat)?;
+        job.tally = done.tally;
+        report.chunks = done.chunks;
+        report.chunk_rounds = done.rounds;
+        report.collapses_in_chunks = done.tally.collapses;
+        report.non_manifold_edges_in = done.non_manifold_edges_in;
+    }
+    report.chunk_seconds = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    let Oriented { mesh, flipped, .. } =
+        Mesh::<S>::oriented(flat.positions.len(), std::mem::take(&mut flat.triangles));
+    let (mut surface, states) = flat.into_surface(mesh, scale, &flipped);
+    report.mesh_bytes = surface.mesh_bytes();
+    if report.chunk_rounds == 0 {
+        report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
+    }
+    report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
+    report.build_seconds = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    if options.boundary == Boundary::Lock {
+        surface.lock_boundary();
+    }
+    if let Some(degrees) = options.feature_angle_degrees {
+        surface.mark_creases(degrees);
+    }
     let (surface, (reason, blocked)) = match options.quality {
-        Quality::Fast => job.collapse::<S, Accumulated>(surface, stop),
-        Quality::Standard => job.collapse::<S, Memoryless>(surface, stop),
+        Quality::Fast | Quality::Standard => job.collapse::<S, C>(surface, states, stop),
         Quality::Best => job.collapse_and_fit(surface, stop),
     }?;
     report.tally = job.tally;
@@ -221,7 +238,7 @@ fn run<S: EdgeStore>(
     report.vertices_out = positions.len();
     let output =
         IndexedMesh::with_origin(origin, positions, triangles)?.with_double_sided(double_sided)?;
-    report.decimate_seconds = start.elapsed().as_secs_f64();
+    report.decimate_seconds = start.elapsed().as_secs_f64() + report.chunk_seconds;
     Ok(output)
 }
 
@@ -239,9 +256,14 @@ impl Job<'_> {
     fn collapse<S: EdgeStore, C: Cost<S>>(
         &mut self,
         surface: Surface<S>,
+        states: Vec<C::State>,
         stop: Stop,
     ) -> Result<(Surface<S>, Stopped)> {
-        let cost = C::new(&surface, self.options);
+        let cost = if states.is_empty() {
+            C::new(&surface, self.options)
+        } else {
+            C::with_states(&surface, self.options, states)
+        };
         let mut greedy = Greedy::new(surface, cost, self.options.topology, self.tally);
         let stopped = greedy.run(stop, self.options.check, self.progress)?;
         let (surface, _, tally) = greedy.into_parts();
@@ -262,7 +284,7 @@ impl Job<'_> {
         loop {
             let triangles = surface.triangles();
             let stopped;
-            (surface, stopped) = self.collapse::<S, Memoryless>(surface, stop)?;
+            (surface, stopped) = self.collapse::<S, Memoryless>(surface, Vec::new(), stop)?;
             let is_untouched = surface.triangles() == triangles;
             if stopped.0 == StopReason::Cancelled || is_untouched {
                 return Ok((surface, stopped));

@@ -61,6 +61,23 @@ pub struct Tally {
     pub working_bytes: usize,
 }
 
+impl Tally {
+    /// Counts what was counted elsewhere as well.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.collapses += other.collapses;
+        self.collapses_non_manifold += other.collapses_non_manifold;
+        self.contractions += other.contractions;
+        self.filled_faces += other.filled_faces;
+        self.pinched_handles += other.pinched_handles;
+        self.removed_components += other.removed_components;
+        self.rejected_link += other.rejected_link;
+        self.rejected_flip += other.rejected_flip;
+        self.rejected_lock += other.rejected_lock;
+        self.rejected_error += other.rejected_error;
+        self.working_bytes = self.working_bytes.max(other.working_bytes);
+    }
+}
+
 /// What a run did. Serialised, the keys are the command's report.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
@@ -101,6 +118,14 @@ pub struct Report {
     pub tier_reason: String,
     /// The bytes of the mesh when built: the tier's words, positions and side tables.
     pub mesh_bytes: usize,
+    /// Chunks that were decimated on their own before the whole; 0 for a small mesh.
+    pub chunks: usize,
+    /// How often the mesh was cut into chunks.
+    pub chunk_rounds: usize,
+    /// Of the collapses, those in chunks.
+    pub collapses_in_chunks: usize,
+    /// Seconds spent on chunks: part of `decimate_seconds`.
+    pub chunk_seconds: f64,
     /// Seconds to read the file; filled in by whoever read it.
     pub read_seconds: f64,
     /// Seconds to weld, drop and fold.

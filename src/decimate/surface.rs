@@ -44,19 +44,35 @@ pub struct Surface<S> {
     pub weights: Vec<f32>,
     /// An estimate of how far each vertex is from the original, in the unit box.
     pub deviation: Vec<f32>,
+    /// One flag a vertex that has faces elsewhere, so that no edge at it collapses here, or nothing
+    /// where all faces are here.
+    pub seam: Vec<bool>,
     /// How far what was removed altogether may have been from what is left, in the unit box.
     pub lost: f64,
 }
-
-/// The largest weight, relative to the middle one: large enough to leave a vertex for the last, and
-/// small enough for what it multiplies to stay finite in single precision.
-const LARGEST_WEIGHT: f32 = 1e20;
 
 impl<S: EdgeStore> Surface<S> {
     /// Whether the vertex must not move.
     #[inline]
     pub fn is_locked(&self, v: VertexId) -> bool {
         self.locked.get(v.index()) == Some(&true)
+    }
+
+    /// Whether the vertex has faces elsewhere.
+    #[inline]
+    pub fn is_on_seam(&self, v: VertexId) -> bool {
+        self.seam.get(v.index()) == Some(&true)
+    }
+
+    /// Whether the edge may have faces elsewhere.
+    #[inline]
+    pub fn is_rim(&self, e: EdgeId) -> bool {
+        !self.seam.is_empty() && self.mesh.edge_vertices(e).map(|v| self.is_on_seam(v)) == [true; 2]
+    }
+
+    /// Whether anything is to be said of faces beside their vertices.
+    pub fn has_flags(&self) -> bool {
+        !(self.double_sided.is_empty() && self.turned.is_empty() && self.creases.is_empty())
     }
 
     /// Locks a vertex.
@@ -89,30 +105,6 @@ impl<S: EdgeStore> Surface<S> {
             self.mesh.face_count()
         } else {
             self.mesh.faces().map(|f| self.sides(f)).sum()
-        }
-    }
-
-    /// Weighs the vertices: one weight each, or none. Infinite ones lock; of the others only the
-    /// ratios count. The middle one becomes 1, the weight that the costs' tie-break is made for.
-    pub fn weigh(&mut self, mut weights: Vec<f32>) {
-        let is_proper = |w: &f32| *w > 0.0 && w.is_finite();
-        let mut proper: Vec<f32> = weights.iter().copied().filter(is_proper).collect();
-        let half = proper.len() / 2;
-        let middle = if proper.is_empty() {
-            1.0
-        } else {
-            *proper.select_nth_unstable_by(half, f32::total_cmp).1
-        };
-        for (v, weight) in weights.iter_mut().enumerate() {
-            if weight.is_infinite() {
-                self.lock(VertexId::new(v));
-                *weight = 1.0;
-            } else {
-                *weight = (*weight / middle).min(LARGEST_WEIGHT);
-            }
-        }
-        if weights.iter().any(|&w| w != 1.0) {
-            self.weights = weights;
         }
     }
 
@@ -161,10 +153,13 @@ impl<S: EdgeStore> Surface<S> {
     /// Which ends of `e` stay where they are if it collapses, tail first.
     #[inline]
     pub fn held(&self, e: EdgeId) -> [bool; 2] {
-        if self.locked.is_empty() && self.creases.is_empty() {
+        if self.locked.is_empty() && self.creases.is_empty() && self.seam.is_empty() {
             return [false; 2];
         }
         let ends = self.mesh.edge_vertices(e);
+        if ends.iter().any(|&v| self.is_on_seam(v)) {
+            return [true; 2];
+        }
         let mut held = ends.map(|v| self.is_locked(v));
         if !self.creases.is_empty() {
             let free = if self.is_curve(e) { 2 } else { 0 };
@@ -193,7 +188,7 @@ impl<S: EdgeStore> Surface<S> {
         e: EdgeId,
         position: Vec3,
         contraction: Option<&Contraction>,
-        deviation: f64,
+        deviation: f32,
     ) -> Merged {
         let from = self
             .mesh
@@ -232,7 +227,7 @@ impl<S: EdgeStore> Surface<S> {
                 }
             }
         }
-        self.deviation[collapse.kept.index()] = deviation as f32;
+        self.deviation[collapse.kept.index()] = deviation;
         Merged {
             collapse,
             from,
@@ -342,13 +337,13 @@ impl<S: EdgeStore> Surface<S> {
     /// memoryless cost forgets, so each vertex carries the sum of what its collapses moved away from
     /// the planes at hand.
     #[inline]
-    pub fn deviation_after(&self, e: EdgeId, position: Vec3) -> Option<f64> {
+    pub fn deviation_after(&self, e: EdgeId, position: Vec3) -> Option<f32> {
         let [v, w] = self
             .mesh
             .edge_vertices(e)
             .map(|v| self.deviation[v.index()]);
         let moved = rules::distance_from_star(&self.mesh, &self.geometry, e, position)?;
-        Some(f64::from(v.max(w)) + moved)
+        Some(v.max(w) + moved)
     }
 
     /// The largest estimated distance from the original, in the unit box.
@@ -388,6 +383,7 @@ impl<S: EdgeStore> Surface<S> {
     /// The bytes of what is carried along.
     pub fn carried_bytes(&self) -> usize {
         self.locked.capacity()
+            + self.seam.capacity()
             + self.double_sided.capacity()
             + self.creases.capacity()
             + (self.weights.capacity() + self.deviation.capacity()) * size_of::<f32>()

@@ -52,7 +52,13 @@ impl<S: EdgeStore> Mesh<S> {
 
     /// The number of edges that exactly two faces share and run along the same way.
     pub fn same_way_pair_count(&self) -> usize {
-        self.edge_rows.rows().filter(|row| row.len() == 2).count()
+        self.same_way_pairs().count()
+    }
+
+    /// The edges that exactly two faces share and run along the same way, one directed edge each.
+    pub fn same_way_pairs(&self) -> impl Iterator<Item = EdgeId> + '_ {
+        let pairs = self.edge_rows.rows().filter(|row| row.len() == 2);
+        pairs.map(|row| row[0])
     }
 
     /// Which faces to turn round so that neighbours agree: in each component (joined across edges

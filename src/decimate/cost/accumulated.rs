@@ -2,7 +2,6 @@
 //! area weights and boundary lines.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
@@ -16,7 +15,7 @@ use crate::mesh::{Collapse, EdgeId, EdgeStore, VertexId};
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
 /// y from the vertex, where single precision has all its digits. 40 bytes.
 #[derive(Clone, Copy, Debug, Default)]
-struct Quadric {
+pub struct Quadric {
     a: [f32; 6],
     b: [f32; 3],
     c: f32,
@@ -44,69 +43,98 @@ pub struct Accumulated {
     placement: Placement,
 }
 
-/// The planes and lines at a vertex, all of which pass through it.
-fn quadric_at<S: EdgeStore>(surface: &Surface<S>, v: VertexId, boundary_weight: f64) -> Quadric {
-    let (mesh, geometry) = (&surface.mesh, &surface.geometry);
-    let point = geometry.position(v);
-    let mut a = Symmetric::default();
-    let add_line = |a: &mut Symmetric, e: EdgeId, along: DVec3| {
-        // A crease is met from both of its faces.
-        let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
-        if let Some(weight) = of_crease.or_else(|| singular_weight(mesh, e, boundary_weight)) {
-            let mut line = Symmetric::default();
-            line.add_line(along, LINE_WEIGHT * weight);
-            *a = a.plus(line);
-        }
-    };
-    for e in mesh.outgoing_edges(v) {
-        let (to_head, to_apex) = (
-            geometry.vector(point, mesh.head(e)),
-            geometry.vector(point, mesh.apex(e)),
-        );
-        let normal = to_head.cross(to_apex);
-        let length = normal.length();
-        if length > 0.0 {
-            a.add_outer(normal, 0.5 / length);
-        }
-        add_line(&mut a, e, to_head);
-        add_line(&mut a, mesh.prev(e), to_apex);
-    }
-    let weight = surface.weight(v);
-    Quadric {
-        a: a.0.map(|x| (x * weight) as f32),
-        ..Quadric::default()
-    }
-}
-
 impl<S: EdgeStore> Cost<S> for Accumulated {
     const MAY_FALL: bool = false;
 
     type Queue = Buckets;
+    type State = Quadric;
 
     fn new(surface: &Surface<S>, options: &Options) -> Self {
-        let weight = boundary_weight(options.boundary);
-        let quadric = |v| quadric_at(surface, VertexId::new(v), weight);
-        let slots = surface.mesh.vertex_slots();
+        let (mesh, geometry) = (&surface.mesh, &surface.geometry);
+        let mut sums = vec![Symmetric::default(); mesh.vertex_slots()];
+        let boundary = boundary_weight(options.boundary);
+        for f in mesh.faces() {
+            let corners = mesh.face_vertices(f);
+            let [a, b, c] = corners.map(|v| geometry.position(v));
+            let normal = geometry.vector(a, corners[1]).cross(geometry.vector(a, corners[2]));
+            let length = normal.length();
+            if length > 0.0 {
+                let mut plane = Symmetric::default();
+                plane.add_outer(normal, 0.5 / length);
+                for v in corners {
+                    sums[v.index()] = sums[v.index()].plus(plane);
+                }
+            }
+            for (e, along) in f.edges().into_iter().zip([b - a, c - b, a - c]) {
+                if mesh.mate(e).is_some() && surface.creases.is_empty() {
+                    continue;
+                }
+                // A crease is met from both of its faces.
+                let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
+                let of_singular = || singular_weight(mesh, e, boundary).filter(|_| !surface.is_rim(e));
+                if let Some(weight) = of_crease.or_else(of_singular) {
+                    let along = along.as_dvec3() * geometry.scale();
+                    for v in mesh.edge_vertices(e) {
+                        sums[v.index()].add_line(along, LINE_WEIGHT * weight);
+                    }
+                }
+            }
+        }
+        let quadric = |(v, sum): (usize, Symmetric)| {
+            let weight = surface.weight(VertexId::new(v));
+            Quadric {
+                a: sum.0.map(|x| (x * weight) as f32),
+                ..Quadric::default()
+            }
+        };
         Self {
-            quadrics: (0..slots).into_par_iter().map(quadric).collect(),
+            quadrics: sums.into_iter().enumerate().map(quadric).collect(),
             placement: options.placement,
         }
     }
 
+    fn with_states(_: &Surface<S>, options: &Options, states: Vec<Quadric>) -> Self {
+        Self {
+            quadrics: states,
+            placement: options.placement,
+        }
+    }
+
+    fn into_states(self) -> Vec<Quadric> {
+        self.quadrics
+    }
+
+    fn line(options: &Options, along: DVec3, is_boundary: bool) -> Quadric {
+        let weight = if is_boundary {
+            boundary_weight(options.boundary)
+        } else {
+            BOUNDARY_WEIGHT
+        };
+        let mut a = Symmetric::default();
+        a.add_line(along, LINE_WEIGHT * weight);
+        Quadric {
+            a: a.0.map(|x| x as f32),
+            ..Quadric::default()
+        }
+    }
+
+    fn join(state: &mut Quadric, part: &Quadric) {
+        state.a = std::array::from_fn(|i| state.a[i] + part.a[i]);
+        state.b = std::array::from_fn(|i| state.b[i] + part.b[i]);
+        state.c += part.c;
+    }
+
+    #[inline]
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
         let ends = surface.mesh.edge_vertices(e);
         let [v, w] = ends;
-        let half = surface.geometry.between(w, v) * 0.5;
-        // From the middle, which lies at −h from the tail and at h from the head.
-        let (a_v, b_v, c_v) = self.quadrics[v.index()].seen_from(-half);
-        let (a_w, b_w, c_w) = self.quadrics[w.index()].seen_from(half);
-        let form = Form {
-            m: a_v.plus(a_w),
-            b: b_v + b_w,
-            at_middle: c_v + c_w,
-            half,
-        };
-        form.place(surface, ends, held, self.placement, |_, y, _| y)
+        let along = surface.geometry.between(v, w);
+        let [at_v, at_w] = ends.map(|v| &self.quadrics[v.index()]);
+        let [a_v, a_w] = [at_v, at_w].map(|q| Symmetric::from_single(q.a));
+        let mut form = Form::of_ends(&a_v, &a_w, along);
+        form.b += at_v.b() + at_w.b();
+        form.at_tail += 2.0 * at_w.b().dot(along) + f64::from(at_v.c) + f64::from(at_w.c);
+        form.place(surface, ends, held, self.placement, |_, x, _| x)
     }
 
     fn after_collapse(

@@ -74,8 +74,8 @@ const HEAVY: u16 = 8;
 /// evaluates all of them, takes 1.6 times as long for 0.2 % of rms.
 const CHANGE: f32 = 0.35;
 
-/// With fewer faces than this all edges are evaluated at once: there it costs nothing, and a few
-/// collapses decide how the result looks.
+/// With fewer faces than this all edges are evaluated at once, unless they are part of a larger
+/// mesh: there it costs nothing, and a few collapses decide how the result looks.
 const EXACT_BELOW: usize = 8000;
 
 /// The memoryless, volume-constrained cost.
@@ -84,6 +84,7 @@ pub struct Memoryless {
     lag: Vec<Lag>,
     boundary_weight: f64,
     placement: Placement,
+    exact_below: usize,
 }
 
 impl Memoryless {
@@ -181,6 +182,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     const MAY_FALL: bool = true;
 
     type Queue = Buckets;
+    type State = ();
 
     fn new(surface: &Surface<S>, options: &Options) -> Self {
         let slots = surface.mesh.vertex_slots();
@@ -188,6 +190,11 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             tensors: Vec::new(),
             lag: Vec::new(),
             boundary_weight: boundary_weight(options.boundary),
+            exact_below: if surface.seam.is_empty() {
+                EXACT_BELOW
+            } else {
+                0
+            },
             placement: options.placement,
         };
         let tensor = |v| model.tensor(surface, VertexId::new(v));
@@ -195,35 +202,43 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         model
     }
 
+    fn with_states(surface: &Surface<S>, options: &Options, _: Vec<()>) -> Self {
+        Self::new(surface, options)
+    }
+
+    fn into_states(self) -> Vec<()> {
+        vec![(); self.tensors.len()]
+    }
+
+    fn line(_: &Options, _: DVec3, _: bool) {}
+
+    fn join((): &mut (), (): &()) {}
+
+    #[inline]
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
         let ends = surface.mesh.edge_vertices(e);
         let [at_v, at_w] = ends.map(|v| &self.tensors[v.index()]);
         let [quadratic_v, quadratic_w] = [at_v, at_w].map(|t| Symmetric::from_single(t.quadratic));
-        let half = surface.geometry.between(ends[1], ends[0]) * 0.5;
-        let m = quadratic_v.plus(quadratic_w);
-        let form = Form {
-            m,
-            b: quadratic_v.times(half) - quadratic_w.times(half),
-            at_middle: half.dot(m.times(half)),
-            half,
-        };
+        let along = surface.geometry.between(ends[0], ends[1]);
+        let form = Form::of_ends(&quadratic_v, &quadratic_w, along);
         let heavy = ends.map(|v| self.lag[v.index()].every >= HEAVY);
         let held = if held == [false; 2] && heavy != [true; 2] {
             heavy
         } else {
             held
         };
-        let keep_volume = |factor: &Factor, y: DVec3, trace: f64| {
+        let keep_volume = |factor: &Factor, x: DVec3, trace: f64| {
             let g = self.area_around(surface, e);
             // The trace is weighted, the normals are not.
             let [weight_v, weight_w] = ends.map(|v| surface.weight(v));
             let trace = trace / weight_v.max(weight_w);
             if g.length_squared() > CONSTRAINED * trace * trace {
-                let k = (at_v.area() - at_w.area()).dot(half);
+                // The volume that a point x from the tail would add is (g·x − k)/6.
+                let k = (g - at_v.area() + at_w.area()).dot(along) * 0.5;
                 let direction = factor.solve(g);
-                y + direction * ((k - g.dot(y)) / g.dot(direction))
+                x + direction * ((k - g.dot(x)) / g.dot(direction))
             } else {
-                y
+                x
             }
         };
         form.place(surface, ends, held, self.placement, keep_volume)
@@ -246,7 +261,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             changed[1..].sort_unstable();
             changed.dedup();
         }
-        let is_exact = surface.mesh.face_count() < EXACT_BELOW;
+        let is_exact = surface.mesh.face_count() < self.exact_below;
         let mut is_first = true;
         changed.retain(|&x| {
             if std::mem::take(&mut is_first) {
@@ -281,7 +296,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     }
 
     fn exact_below(&self) -> usize {
-        EXACT_BELOW
+        self.exact_below
     }
 
     fn moves_vertices(&self) -> bool {

@@ -33,8 +33,25 @@ pub trait Cost<S: EdgeStore>: Send + Sync {
     /// What keeps the candidates in order.
     type Queue: Queue;
 
-    /// The model's state for a surface, computed in parallel.
+    /// What is known of a vertex beyond the surface around it.
+    type State: Clone + Default + Send + Sync;
+
+    /// The model of a surface, computed in parallel. Of a vertex on a seam it knows what the faces
+    /// here say, without the [lines](Self::line) of the rim.
     fn new(surface: &Surface<S>, options: &Options) -> Self;
+
+    /// The model of a surface whose states are known.
+    fn with_states(surface: &Surface<S>, options: &Options, states: Vec<Self::State>) -> Self;
+
+    /// The states, one a vertex slot.
+    fn into_states(self) -> Vec<Self::State>;
+
+    /// What a boundary or non-manifold edge adds to the state of each of its ends; `along` it, in
+    /// the unit box.
+    fn line(options: &Options, along: DVec3, is_boundary: bool) -> Self::State;
+
+    /// Adds to a state what other faces or lines say.
+    fn join(state: &mut Self::State, part: &Self::State);
 
     /// The collapse of `e` with its tail or head held in place; nothing where both are held.
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation>;
@@ -109,19 +126,31 @@ fn singular_weight<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId, boundary_weight: f64
     }
 }
 
-/// An edge's energy, E(y) = yᵀMy − 2bᵀy + c, with y from the middle and the ends at ±h.
+/// An edge's energy, E(x) = xᵀMx − 2bᵀx + c, with x from the tail.
 struct Form {
     m: Symmetric,
     b: DVec3,
-    at_middle: f64,
-    /// From the middle to the tail.
-    half: DVec3,
+    at_tail: f64,
+    /// From the tail to the head.
+    along: DVec3,
 }
 
 impl Form {
+    /// The sum of xᵀVx, centred at the tail, and the same of W, centred at the head.
     #[inline(always)]
-    fn energy(&self, y: DVec3) -> f64 {
-        y.dot(self.m.times(y)) - 2.0 * self.b.dot(y) + self.at_middle
+    fn of_ends(v: &Symmetric, w: &Symmetric, along: DVec3) -> Self {
+        let b = w.times(along);
+        Self {
+            m: v.plus(*w),
+            b,
+            at_tail: along.dot(b),
+            along,
+        }
+    }
+
+    #[inline(always)]
+    fn energy(&self, x: DVec3) -> f64 {
+        x.dot(self.m.times(x) - self.b - self.b) + self.at_tail
     }
 
     /// The cheapest position: where the energy is least, moved by `constrain`, or an end where that
@@ -136,29 +165,32 @@ impl Form {
         constrain: impl FnOnce(&Factor, DVec3, f64) -> DVec3,
     ) -> Option<Evaluation> {
         let geometry = &surface.geometry;
-        let length_squared = 4.0 * self.half.length_squared();
-        let (energy_v, energy_w) = (self.energy(self.half), self.energy(-self.half));
-        let ends = match held {
+        let length_squared = self.along.length_squared();
+        let (at_tail, at_head) = (self.at_tail, self.energy(self.along));
+        let take_tail = match held {
             [true, true] => return None,
-            [true, false] => (energy_v, geometry.position(v)),
-            [false, true] => (energy_w, geometry.position(w)),
-            [false, false] if energy_v <= energy_w => (energy_v, geometry.position(v)),
-            [false, false] => (energy_w, geometry.position(w)),
+            [true, false] => true,
+            [false, true] => false,
+            [false, false] => at_tail <= at_head,
         };
-        let (energy, position) = if held != [false; 2] || placement == Placement::Endpoint {
-            ends
-        } else {
+        let mut energy = if take_tail { at_tail } else { at_head };
+        let mut inside = None;
+        if held == [false; 2] && placement == Placement::Optimal {
             let trace = self.m.trace();
-            let y = Factor::of(&self.m, RIDGE * trace)
+            let middle = self.along * 0.5;
+            let x = Factor::of(&self.m, RIDGE * trace)
                 .map(|factor| constrain(&factor, factor.solve(self.b), trace))
-                .filter(|y| y.length_squared() <= REACH * REACH * length_squared)
-                .unwrap_or(DVec3::ZERO);
-            let at_y = self.energy(y);
-            if ends.0 <= at_y + AS_GOOD * trace * length_squared {
-                ends
-            } else {
-                (at_y, geometry.point_near_middle(v, w, y))
+                .filter(|x| (*x - middle).length_squared() <= REACH * REACH * length_squared)
+                .unwrap_or(middle);
+            let at_x = self.energy(x);
+            if energy > at_x + AS_GOOD * trace * length_squared {
+                energy = at_x;
+                inside = Some(x);
             }
+        }
+        let position = match inside {
+            Some(x) => geometry.point_near(v, x),
+            None => geometry.position(if take_tail { v } else { w }),
         };
         let cost = energy.max(0.0) + TIE_BREAK * length_squared;
         (cost.is_finite() && position.is_finite()).then_some(Evaluation { cost, position })

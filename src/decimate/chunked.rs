@@ -1,0 +1,528 @@
+//! Chunks: pieces of the surface that fit in the cache, decimated one by one under one threshold.
+//!
+//! Each chunk is a small mesh of its own, on which the same loop runs as on a whole one. Vertices
+//! with faces in several chunks are the seam: no edge at them collapses. What a collapse may cost is
+//! the same in all chunks, so that triangles stay where the surface needs them; a pilot finds it:
+//! some of the chunks, spread over the mesh, go up in cost together until their inner vertices are
+//! as few as they should be. A second round, with chunks cut elsewhere, thins out the seams under
+//! the same threshold. What is left is for the loop over the whole mesh, to the exact target.
+//!
+//! The cut depends on the mesh alone and the chunks do not know each other, so the result does not
+//! depend on the number of threads.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::cost::Cost;
+use super::cut::Cut;
+use super::flat::{FaceFlags, Flat};
+use super::greedy::{Greedy, Halt, Stop};
+use super::options::{Options, Topology};
+use super::report::Tally;
+use crate::error::Result;
+use super::surface::Surface;
+use crate::mesh::{EdgeStore, FaceId, Mesh, Outgoing, VertexId};
+
+/// Below so many faces the whole mesh is as quick.
+pub const CHUNKED_ABOVE: usize = 50_000;
+
+/// Chunks stop above the target by this factor: what is left is for the loop over the whole mesh,
+/// which needs room to choose.
+const ABOVE_TARGET: f64 = 1.25;
+
+/// A pair of rounds leaves at least this share of the faces, or the seams would be too dense
+/// between what is left inside.
+const LEAST_DENSITY: f64 = 0.08;
+
+/// Where chunks would leave more than this share, they are not worth the partition.
+const WORTHWHILE: f64 = 0.9;
+
+/// The pilot: this share of the chunks, and at least so many.
+const PILOT_SHARE: f64 = 0.12;
+const PILOT_CHUNKS: usize = 16;
+
+/// The pilot's threshold rises by this factor at least: an eighth of an octave.
+const FINEST_STEP: f64 = 1.09;
+/// And by this one at most.
+const COARSEST_STEP: f64 = 4.0;
+
+/// The chunks whose results wait to be counted, at most.
+const BATCH: usize = 64;
+
+/// The second round's grid lies this share of the box elsewhere.
+const SHIFT: f32 = 0.29;
+
+/// What decimation in chunks goes by.
+pub struct Chunked<'a> {
+    pub options: &'a Options,
+    /// The target of the whole; `max_cost` is not looked at.
+    pub stop: Stop,
+    /// The scale of the whole.
+    pub scale: f64,
+    pub progress: &'a mut dyn FnMut(usize) -> ControlFlow<()>,
+}
+
+/// What decimation in chunks did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Done {
+    pub tally: Tally,
+    /// Chunks, over all rounds.
+    pub chunks: usize,
+    /// Rounds.
+    pub rounds: usize,
+    /// Non-manifold edges of the input.
+    pub non_manifold_edges_in: usize,
+    /// Whether the caller asked to stop.
+    pub is_cancelled: bool,
+}
+
+impl Chunked<'_> {
+    /// Decimates towards the target, not below it; as far as it is worth it.
+    ///
+    /// # Errors
+    /// As [`Greedy::advance`].
+    pub fn reduce<S: EdgeStore, C: Cost<S>>(&mut self, flat: &mut Flat<C::State>) -> Result<Done> {
+        let mut done = Done::default();
+        let least = ABOVE_TARGET * self.stop.triangles as f64;
+        loop {
+            let faces = flat.triangle_count();
+            let density = (least / faces as f64).max(LEAST_DENSITY);
+            if flat.triangles.len() < CHUNKED_ABOVE || density > WORTHWHILE || done.is_cancelled {
+                return Ok(done);
+            }
+            let max_cost = self.round::<S, C>(flat, Until::Density(density), &mut done)?;
+            if !done.is_cancelled {
+                self.round::<S, C>(flat, Until::Cost(max_cost), &mut done)?;
+            }
+            if flat.triangle_count() as f64 > WORTHWHILE * faces as f64 {
+                return Ok(done);
+            }
+        }
+    }
+
+    /// Cuts, decimates every chunk, and puts the results together. The threshold.
+    fn round<S: EdgeStore, C: Cost<S>>(
+        &mut self,
+        flat: &mut Flat<C::State>,
+        until: Until,
+        done: &mut Done,
+    ) -> Result<f32> {
+        let is_first = done.rounds == 0;
+        let cut = Cut::new(flat, if done.rounds.is_multiple_of(2) { 0.0 } else { SHIFT });
+        done.rounds += 1;
+        done.chunks += cut.len();
+        let mut triangles = flat.triangle_count();
+        let mut outcomes: Vec<Option<Outcome<C::State>>> = Vec::new();
+        outcomes.resize_with(cut.len(), || None);
+        let (options, scale, stop) = (self.options, self.scale, self.stop);
+        let begin = |chunk| Chunk::<S, C>::begin(options, scale, flat, &cut, chunk, is_first);
+        let max_cost = match until {
+            Until::Cost(max_cost) => max_cost,
+            Until::Density(density) => {
+                let pilots = pilots(cut.len());
+                let mut chunks: Vec<_> = pilots.par_iter().map(|&k| begin(k)).collect();
+                let budget = triangles.saturating_sub(self.stop.triangles);
+                let max_cost = self.advance_together(&mut chunks, density, budget)?;
+                let ended: Vec<_> = chunks.into_par_iter().map(Chunk::end).collect();
+                for (k, outcome) in pilots.into_iter().zip(ended) {
+                    triangles -= outcome.removed_triangles;
+                    outcomes[k] = Some(outcome);
+                }
+                max_cost
+            }
+        };
+        let rest: Vec<usize> = (0..cut.len()).filter(|&k| outcomes[k].is_none()).collect();
+        let mut rest = &rest[..];
+        while !rest.is_empty() && !done.is_cancelled {
+            // No batch may take the whole below the target, whatever it removes.
+            let budget = triangles.saturating_sub(self.stop.triangles);
+            let mut faces = 0;
+            let fits = |k: &&usize| {
+                faces += 2 * cut.faces(**k).map(|range| range.len()).sum::<usize>();
+                faces <= budget
+            };
+            let batch = rest.iter().take(BATCH).take_while(fits).count().max(1);
+            let (now, later) = rest.split_at(batch);
+            rest = later;
+            let ended: Vec<Outcome<C::State>> = now
+                .par_iter()
+                .map(|&k| {
+                    let mut chunk = begin(k);
+                    chunk.advance(options.check, stop, max_cost, budget)?;
+                    Ok(chunk.end())
+                })
+                .collect::<Result<_>>()?;
+            for (&k, outcome) in now.iter().zip(ended) {
+                triangles -= outcome.removed_triangles;
+                outcomes[k] = Some(outcome);
+            }
+            done.is_cancelled = (self.progress)(triangles).is_break();
+        }
+        for outcome in outcomes.iter().flatten() {
+            done.tally.add(&outcome.tally);
+        }
+        let non_manifold_edges =
+            assemble::<S, C>(self.options, self.scale, flat, &cut, outcomes, is_first);
+        if is_first {
+            done.non_manifold_edges_in = non_manifold_edges;
+        }
+        Ok(max_cost)
+    }
+
+    /// Lets chunks go up in cost together, until so small a share of their inner vertices is left.
+    /// The threshold that they have reached; infinite where nothing is left to collapse.
+    fn advance_together<S: EdgeStore, C: Cost<S>>(
+        &self,
+        chunks: &mut [Chunk<S, C>],
+        density: f64,
+        budget: usize,
+    ) -> Result<f32> {
+        let inner: usize = chunks.iter().map(|c| c.inner).sum();
+        let budget = budget / chunks.len().max(1);
+        let (check, stop) = (self.options.check, self.stop);
+        let mut max_cost = 0.0f32;
+        loop {
+            let halts: Vec<Halt> = chunks
+                .par_iter_mut()
+                .map(|chunk| chunk.advance(check, stop, max_cost, budget))
+                .collect::<Result<_>>()?;
+            let next = halts.iter().filter_map(|halt| match halt {
+                Halt::Cost(next) => Some(*next),
+                Halt::Target | Halt::Empty | Halt::Cancelled => None,
+            });
+            let Some(next) = next.reduce(f32::min) else {
+                return Ok(f32::INFINITY);
+            };
+            let collapses: usize = chunks.iter().map(|c| c.greedy.tally().collapses).sum();
+            let left = 1.0 - collapses as f64 / inner.max(1) as f64;
+            if left <= density {
+                return Ok(max_cost);
+            }
+            let step = (left / density).clamp(FINEST_STEP, COARSEST_STEP);
+            max_cost = next.max((f64::from(max_cost) * step) as f32);
+        }
+    }
+}
+
+/// How far a round goes.
+#[derive(Clone, Copy, Debug)]
+enum Until {
+    /// Until so small a share of the vertices that are not on a seam is left.
+    Density(f64),
+    /// Until a collapse costs more.
+    Cost(f32),
+}
+
+/// Which chunks find the threshold, spread evenly over all.
+fn pilots(chunks: usize) -> Vec<usize> {
+    let count = ((PILOT_SHARE * chunks as f64).ceil() as usize).max(PILOT_CHUNKS).min(chunks);
+    (0..count).map(|i| (2 * i + 1) * chunks / (2 * count)).collect()
+}
+
+/// A piece of the surface and its mesh.
+struct Chunk<S: EdgeStore, C: Cost<S>> {
+    greedy: Greedy<S, C>,
+    /// The vertices by their numbers in the whole: those of the chunk, then others.
+    vertices: Vec<u32>,
+    /// The chunk's own vertices.
+    own: usize,
+    /// Of these, the ones that are on no seam.
+    inner: usize,
+    triangles_before: usize,
+    singular: Singular,
+}
+
+/// What is left of a chunk.
+struct Outcome<V> {
+    /// By the vertices' numbers in the whole.
+    triangles: Vec<[u32; 3]>,
+    flags: Vec<FaceFlags>,
+    /// Inner vertices that are left, ascending.
+    kept: Vec<Kept<V>>,
+    /// The chunk's own vertices that were kept out of it, although all of their faces are in it.
+    held: Vec<u32>,
+    /// What the chunk's faces add to the states of the other vertices.
+    of_seam: Vec<(u32, V)>,
+    singular: Singular,
+    removed_triangles: usize,
+    tally: Tally,
+}
+
+/// A vertex that is left.
+struct Kept<V> {
+    vertex: u32,
+    position: Vec3,
+    deviation: f32,
+    weight: f32,
+    state: V,
+}
+
+/// What a chunk says of boundaries and non-manifold edges before it is decimated.
+#[derive(Default)]
+struct Singular {
+    /// Edges along the seam that have no mate in the chunk. Whether they have one elsewhere shows
+    /// when all are together.
+    rim: Vec<RimEdge>,
+    /// Non-manifold edges that are not on the seam.
+    non_manifold_edges: usize,
+}
+
+/// An edge between two vertices on the seam by their numbers in the whole, the smaller first, and
+/// whether it runs that way.
+type RimEdge = (u32, u32, bool);
+
+impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
+    /// Builds the mesh of a chunk and queues its edges.
+    fn begin(
+        options: &Options,
+        scale: f64,
+        flat: &Flat<C::State>,
+        cut: &Cut,
+        chunk: usize,
+        is_first: bool,
+    ) -> Self {
+        let range = cut.vertices(chunk);
+        let (begin, own) = (range.start, range.len());
+        let faces: usize = cut.faces(chunk).map(|range| range.len()).sum();
+        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(faces);
+        for range in cut.faces(chunk) {
+            triangles.extend_from_slice(&flat.triangles[range]);
+        }
+        let is_own = |v: u32| range.contains(&(v as usize));
+        let corners = triangles.as_flattened().iter().copied();
+        let mut others: Vec<u32> = corners.filter(|&v| !is_own(v)).collect();
+        others.sort_unstable();
+        others.dedup();
+        for v in triangles.as_flattened_mut() {
+            *v = if is_own(*v) {
+                *v - begin as u32
+            } else {
+                let other = others.binary_search(v).expect("it was collected");
+                (own + other) as u32
+            };
+        }
+        let mut vertices: Vec<u32> = Vec::with_capacity(own + others.len());
+        vertices.extend(range.clone().map(|v| v as u32));
+        vertices.append(&mut others);
+        let gathered = Flat {
+            positions: gather(&flat.positions, &vertices),
+            locked: gather(&flat.locked, &vertices),
+            weights: gather(&flat.weights, &vertices),
+            deviation: gather(&flat.deviation, &vertices),
+            states: gather(&flat.states, &vertices),
+            flags: if flat.flags.is_empty() {
+                Vec::new()
+            } else {
+                let ranges = cut.faces(chunk);
+                ranges.flat_map(|range| flat.flags[range].iter().copied()).collect()
+            },
+            triangles: Vec::new(),
+        };
+        let mesh = Mesh::<S>::from_triangles(vertices.len(), &triangles);
+        drop(triangles);
+        let (mut surface, states) = gathered.into_surface(mesh, scale, &[]);
+        surface.seam = (0..vertices.len())
+            .map(|v| v >= own || cut.is_shared(begin + v))
+            .collect();
+        let (cost, singular) = if is_first {
+            (C::new(&surface, options), singular(&surface, &vertices))
+        } else {
+            (C::with_states(&surface, options, states), Singular::default())
+        };
+        // Neighbours that do not agree wait until the whole is oriented.
+        for e in surface.mesh.same_way_pairs() {
+            for v in surface.mesh.edge_vertices(e) {
+                surface.seam[v.index()] = true;
+            }
+        }
+        let inner = surface.seam.iter().filter(|&&on_seam| !on_seam).count();
+        let greedy = Greedy::new(surface, cost, Topology::Preserve, Tally::default());
+        Self {
+            triangles_before: greedy.triangles(),
+            greedy,
+            vertices,
+            own,
+            inner,
+            singular,
+        }
+    }
+
+    /// Collapses what costs no more, and removes no more triangles than the budget.
+    fn advance(&mut self, check: bool, stop: Stop, max_cost: f32, budget: usize) -> Result<Halt> {
+        let stop = Stop {
+            triangles: self.triangles_before.saturating_sub(budget),
+            max_cost,
+            ..stop
+        };
+        let on = &mut |_| ControlFlow::Continue(());
+        self.greedy.advance(stop, check, on)
+    }
+
+    /// What is left.
+    fn end(self) -> Outcome<C::State> {
+        let removed_triangles = self.triangles_before - self.greedy.triangles();
+        let (surface, cost, tally) = self.greedy.into_parts();
+        let mesh = &surface.mesh;
+        let number = |v: VertexId| self.vertices[v.index()];
+        let mut outcome = Outcome {
+            triangles: mesh.faces().map(|f| mesh.face_vertices(f).map(number)).collect(),
+            flags: Vec::new(),
+            kept: Vec::with_capacity(self.inner - tally.collapses),
+            held: Vec::new(),
+            of_seam: Vec::new(),
+            singular: self.singular,
+            removed_triangles,
+            tally,
+        };
+        if surface.has_flags() {
+            outcome.flags = mesh.faces().map(|f| surface.flags(f)).collect();
+        }
+        let is_stateless = size_of::<C::State>() == 0;
+        for (v, state) in cost.into_states().into_iter().enumerate() {
+            let id = VertexId::new(v);
+            if surface.is_on_seam(id) {
+                if v < self.own {
+                    outcome.held.push(number(id));
+                }
+                if !is_stateless {
+                    outcome.of_seam.push((number(id), state));
+                }
+            } else if mesh.outgoing(id) != Outgoing::None {
+                outcome.kept.push(Kept {
+                    vertex: number(id),
+                    position: surface.geometry.position(id),
+                    deviation: surface.deviation[v],
+                    weight: surface.weight(id) as f32,
+                    state,
+                });
+            }
+        }
+        outcome
+    }
+}
+
+/// The singular edges of a chunk whose vertices have these numbers in the whole.
+fn singular<S: EdgeStore>(surface: &Surface<S>, vertices: &[u32]) -> Singular {
+    let mesh = &surface.mesh;
+    let mut singular = Singular::default();
+    for e in mesh.faces().flat_map(FaceId::edges).filter(|&e| mesh.mate(e).is_none()) {
+        if surface.is_rim(e) {
+            let [a, b] = mesh.edge_vertices(e).map(|v| vertices[v.index()]);
+            singular.rim.push((a.min(b), a.max(b), a < b));
+        } else if !mesh.is_boundary(e) && mesh.canonical(e) == e {
+            singular.non_manifold_edges += 1;
+        }
+    }
+    singular
+}
+
+/// Puts what is left of the chunks in the place of the whole; the number of non-manifold edges that
+/// the whole had, in the first round.
+fn assemble<S: EdgeStore, C: Cost<S>>(
+    options: &Options,
+    scale: f64,
+    flat: &mut Flat<C::State>,
+    cut: &Cut,
+    mut outcomes: Vec<Option<Outcome<C::State>>>,
+    is_first: bool,
+) -> usize {
+    let mut rim: Vec<RimEdge> = Vec::new();
+    let mut non_manifold_edges = 0;
+    for outcome in outcomes.iter_mut().flatten() {
+        rim.append(&mut outcome.singular.rim);
+        non_manifold_edges += outcome.singular.non_manifold_edges;
+    }
+    rim.par_sort_unstable();
+    let edges = || rim.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+    let is_singular = |edge: &&[RimEdge]| !matches!(edge, [a, b] if a.2 != b.2);
+    non_manifold_edges += edges().filter(is_singular).filter(|edge| edge.len() > 1).count();
+
+    let mut alive = vec![true; flat.positions.len()];
+    flat.deviation.resize(flat.positions.len(), 0.0);
+    let left = outcomes.iter().flatten().map(|o| o.triangles.len()).sum();
+    let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(left);
+    let mut flags = Vec::new();
+    for (k, outcome) in outcomes.iter_mut().enumerate() {
+        let Some(outcome) = outcome else {
+            // Cancelled before its turn.
+            for range in cut.faces(k) {
+                triangles.extend_from_slice(&flat.triangles[range.clone()]);
+                flags.extend(flat.flags.get(range).into_iter().flatten());
+            }
+            continue;
+        };
+        triangles.append(&mut outcome.triangles);
+        flags.append(&mut outcome.flags);
+        for v in cut.vertices(k) {
+            alive[v] = cut.is_shared(v);
+        }
+        for &v in &outcome.held {
+            alive[v as usize] = true;
+        }
+        for kept in &outcome.kept {
+            let v = kept.vertex as usize;
+            alive[v] = true;
+            flat.positions[v] = kept.position;
+            flat.deviation[v] = kept.deviation;
+            if let Some(weight) = flat.weights.get_mut(v) {
+                *weight = kept.weight;
+            }
+        }
+    }
+    let mut next = 0;
+    let renamed: Vec<u32> = alive
+        .iter()
+        .map(|&alive| {
+            next += u32::from(alive);
+            next.wrapping_sub(1)
+        })
+        .collect();
+    triangles.par_iter_mut().flatten().for_each(|v| *v = renamed[*v as usize]);
+    let lines: Vec<(u32, C::State)> = edges()
+        .filter(is_singular)
+        .flat_map(|edge| {
+            let [a, b] = [edge[0].0, edge[0].1];
+            let [p, q] = [a, b].map(|v| flat.positions[v as usize].as_dvec3() * scale);
+            [a, b].map(|v| (renamed[v as usize], C::line(options, q - p, edge.len() == 1)))
+        })
+        .collect();
+    retain(&mut flat.positions, &alive);
+    retain(&mut flat.locked, &alive);
+    retain(&mut flat.weights, &alive);
+    retain(&mut flat.deviation, &alive);
+    if is_first {
+        flat.states = vec![C::State::default(); next as usize];
+    } else {
+        retain(&mut flat.states, &alive);
+    }
+    for outcome in outcomes.into_iter().flatten() {
+        for kept in outcome.kept {
+            flat.states[renamed[kept.vertex as usize] as usize] = kept.state;
+        }
+        for (v, part) in outcome.of_seam.iter().filter(|_| is_first) {
+            C::join(&mut flat.states[renamed[*v as usize] as usize], part);
+        }
+    }
+    for (v, line) in &lines {
+        C::join(&mut flat.states[*v as usize], line);
+    }
+    flat.triangles = triangles;
+    flat.flags = flags;
+    non_manifold_edges
+}
+
+fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut keep = keep.iter();
+    values.retain(|_| keep.next().is_some_and(|&keep| keep));
+    values.shrink_to_fit();
+}
+
+fn gather<T: Clone>(values: &[T], ids: &[u32]) -> Vec<T> {
+    if values.is_empty() {
+        Vec::new()
+    } else {
+        ids.iter().map(|&v| values[v as usize].clone()).collect()
+    }
+}

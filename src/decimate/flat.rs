@@ -1,0 +1,193 @@
+//! A surface as flat arrays, without connectivity: what is handed from stage to stage.
+
+use glam::Vec3;
+
+use super::geometry::Geometry;
+use super::surface::Surface;
+use crate::indexed_mesh::Parts;
+use crate::mesh::{EdgeStore, FaceId, Mesh};
+
+/// What is known of a face beside its vertices, in one byte.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FaceFlags(u8);
+
+impl FaceFlags {
+    const DOUBLE_SIDED: u8 = 1;
+    const TURNED: u8 = 2;
+    /// Of the edge at the first corner; the next two bits are the other edges'.
+    const CREASE: u8 = 4;
+
+    /// Whether the face counts as two.
+    pub fn is_double_sided(self) -> bool {
+        self.0 & Self::DOUBLE_SIDED != 0
+    }
+}
+
+/// Positions, triangles and what is carried along: one element a vertex or a face, or none at all
+/// where nothing is to be said.
+#[derive(Debug, Default)]
+pub struct Flat<V> {
+    /// Where the vertices are.
+    pub positions: Vec<Vec3>,
+    /// Three vertices each.
+    pub triangles: Vec<[u32; 3]>,
+    /// The vertices that must not move.
+    pub locked: Vec<bool>,
+    /// What the cost is multiplied by around each vertex.
+    pub weights: Vec<f32>,
+    /// How far each vertex may be from the original, in the unit box.
+    pub deviation: Vec<f32>,
+    /// What a cost model knows of each vertex.
+    pub states: Vec<V>,
+    /// What is known of the faces.
+    pub flags: Vec<FaceFlags>,
+}
+
+/// The largest weight, relative to the middle one: large enough to leave a vertex for the last, and
+/// small enough for what it multiplies to stay finite in single precision.
+const LARGEST_WEIGHT: f32 = 1e20;
+
+impl<V> Flat<V> {
+    /// The arrays of a mesh.
+    pub fn of(parts: Parts) -> Self {
+        let flags = Self::flags_of(parts.triangles.len(), &parts.double_sided, &[], &[]);
+        let mut flat = Self {
+            positions: parts.positions,
+            triangles: parts.triangles,
+            locked: Vec::new(),
+            weights: Vec::new(),
+            deviation: Vec::new(),
+            states: Vec::new(),
+            flags,
+        };
+        flat.weigh(parts.weights);
+        flat
+    }
+
+    /// Weighs the vertices: one weight each, or none. Infinite ones lock; of the others only the
+    /// ratios count. The middle one becomes 1, the weight that the costs' tie-break is made for.
+    fn weigh(&mut self, mut weights: Vec<f32>) {
+        let is_proper = |w: &f32| *w > 0.0 && w.is_finite();
+        let mut proper: Vec<f32> = weights.iter().copied().filter(is_proper).collect();
+        let half = proper.len() / 2;
+        let middle = if proper.is_empty() {
+            1.0
+        } else {
+            *proper.select_nth_unstable_by(half, f32::total_cmp).1
+        };
+        for (v, weight) in weights.iter_mut().enumerate() {
+            if weight.is_infinite() {
+                self.locked.resize(self.positions.len(), false);
+                self.locked[v] = true;
+                *weight = 1.0;
+            } else {
+                *weight = (*weight / middle).min(LARGEST_WEIGHT);
+            }
+        }
+        if weights.iter().any(|&w| w != 1.0) {
+            self.weights = weights;
+        }
+    }
+
+    /// The triangles, double-sided ones counted as two.
+    pub fn triangle_count(&self) -> usize {
+        let double = self.flags.iter().filter(|f| f.is_double_sided()).count();
+        self.triangles.len() + double
+    }
+
+    /// The bytes of what the arrays hold.
+    pub fn bytes(&self) -> usize {
+        size_of::<Vec3>() * self.positions.capacity()
+            + size_of::<[u32; 3]>() * self.triangles.capacity()
+            + self.locked.capacity()
+            + size_of::<f32>() * (self.weights.capacity() + self.deviation.capacity())
+            + size_of::<V>() * self.states.capacity()
+            + self.flags.capacity()
+    }
+
+    /// The flags of faces of which some are known to be double-sided, turned round, or to have creases
+    /// as edges; nothing where none is.
+    pub fn flags_of(
+        faces: usize,
+        double_sided: &[bool],
+        turned: &[bool],
+        creases: &[bool],
+    ) -> Vec<FaceFlags> {
+        if double_sided.is_empty() && turned.is_empty() && creases.is_empty() {
+            return Vec::new();
+        }
+        let flag = |flags: &[bool], i: usize, bit: u8| {
+            if flags.get(i) == Some(&true) { bit } else { 0 }
+        };
+        let flags = |f| {
+            let of_face = flag(double_sided, f, FaceFlags::DOUBLE_SIDED)
+                | flag(turned, f, FaceFlags::TURNED);
+            (0..3).fold(of_face, |bits, k| {
+                bits | flag(creases, 3 * f + k, FaceFlags::CREASE << k)
+            })
+        };
+        (0..faces).map(|f| FaceFlags(flags(f))).collect()
+    }
+
+    /// One flag a face or directed edge: which of them has a bit; nothing where none has.
+    fn unpacked(flags: &[FaceFlags], bits: &[u8]) -> Vec<bool> {
+        let any = bits.iter().fold(0, |all, bit| all | bit);
+        if flags.iter().all(|f| f.0 & any == 0) {
+            return Vec::new();
+        }
+        let of_face = |f: &FaceFlags| {
+            let f = *f;
+            bits.iter().map(move |bit| f.0 & bit != 0)
+        };
+        flags.iter().flat_map(of_face).collect()
+    }
+
+    /// The surface of these arrays over a mesh built from their triangles, and the states.
+    ///
+    /// `scale` is the one of the whole. `turned` says which faces were turned round for the mesh.
+    pub fn into_surface<S: EdgeStore>(
+        self,
+        mesh: Mesh<S>,
+        scale: f64,
+        turned: &[bool],
+    ) -> (Surface<S>, Vec<V>) {
+        let mut was_turned = Self::unpacked(&self.flags, &[FaceFlags::TURNED]);
+        if !turned.is_empty() {
+            was_turned.resize(self.triangles.len(), false);
+            for (was, now) in was_turned.iter_mut().zip(turned) {
+                *was ^= now;
+            }
+        }
+        let [a, b, c] = [0, 1, 2].map(|k| FaceFlags::CREASE << k);
+        let mut deviation = self.deviation;
+        deviation.resize(mesh.vertex_slots(), 0.0);
+        let surface = Surface {
+            locked: self.locked,
+            double_sided: Self::unpacked(&self.flags, &[FaceFlags::DOUBLE_SIDED]),
+            creases: Self::unpacked(&self.flags, &[a, b, c]),
+            weights: self.weights,
+            deviation,
+            lost: 0.0,
+            turned: was_turned,
+            geometry: Geometry::new(self.positions, scale),
+            mesh,
+            seam: Vec::new(),
+        };
+        (surface, self.states)
+    }
+}
+
+impl<S: EdgeStore> Surface<S> {
+    /// What is known of a face.
+    pub fn flags(&self, f: FaceId) -> FaceFlags {
+        let flag = |flags: &[bool], i: usize, bit: u8| {
+            if flags.get(i) == Some(&true) { bit } else { 0 }
+        };
+        let of_face = flag(&self.double_sided, f.index(), FaceFlags::DOUBLE_SIDED)
+            | flag(&self.turned, f.index(), FaceFlags::TURNED);
+        let bits = f.edges().into_iter().enumerate().fold(of_face, |bits, (k, e)| {
+            bits | flag(&self.creases, e.index(), FaceFlags::CREASE << k)
+        });
+        FaceFlags(bits)
+    }
+}
