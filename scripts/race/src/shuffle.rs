@@ -29,3 +29,37 @@ pub fn shuffle(mesh: &IndexedMesh, seed: u64) -> Result<IndexedMesh> {
     }
     IndexedMesh::with_origin(mesh.origin(), positions, triangles)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// The same triangles, the same way round, at the same positions; only not in their places.
+    #[test]
+    fn a_shuffled_mesh_is_the_same_surface() {
+        let positions: Vec<_> = (0..100).map(|i| Vec3::splat(i as f32)).collect();
+        let triangles = (0..98).map(|i| [i, i + 1, i + 2]).collect();
+        let mesh = IndexedMesh::new(positions, triangles).unwrap();
+        let shuffled = shuffle(&mesh, 5).unwrap();
+        assert_ne!(shuffled, mesh);
+        assert_eq!(corners(&shuffled), corners(&mesh));
+    }
+
+    /// The corners' x of each triangle, from its least on; sorted.
+    fn corners(mesh: &IndexedMesh) -> Vec<[u32; 3]> {
+        let mut found: Vec<_> = mesh
+            .triangles()
+            .iter()
+            .map(|t| {
+                let mut t = t.map(|v| mesh.positions()[v as usize].x as u32);
+                let least = (0..3).min_by_key(|&k| t[k]).unwrap();
+                t.rotate_left(least);
+                t
+            })
+            .collect();
+        found.sort_unstable();
+        found
+    }
+}

@@ -115,3 +115,25 @@ impl Sums {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// A flat square of two triangles: its corners are cut as those of a cubic spline are, each to
+    /// 3/4 of itself and 1/8 of both neighbours, and the new vertices halve the edges.
+    #[test]
+    fn a_square_is_rounded() {
+        let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]];
+        let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
+        let square = IndexedMesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let mesh = subdivide(square).unwrap();
+        assert_eq!(mesh.triangle_count(), 8);
+        assert_eq!(mesh.positions().len(), 9);
+        assert_eq!(mesh.positions()[0], Vec3::new(1.0, 1.0, 0.0));
+        assert!(mesh.positions().contains(&Vec3::new(4.0, 4.0, 0.0)));
+        assert!(mesh.positions().contains(&Vec3::new(4.0, 0.0, 0.0)));
+    }
+}

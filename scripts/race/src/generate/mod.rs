@@ -58,3 +58,61 @@ impl Surface {
         self.triangles.iter().map(area).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use decimate::metrics::{Info, info};
+
+    use super::*;
+
+    /// About as many triangles as asked for, none without area, all joined up the same way round;
+    /// each kind with the parts and the boundary that it has by its making.
+    #[test]
+    fn each_kind_is_what_it_says() {
+        for (kind, components, boundary_loops, genus) in [
+            (Kind::Terrain, 1, 1, Some(0)),
+            (Kind::Gyroid, 1, 0, None),
+            (Kind::Plinth, 2, 0, Some(0)),
+            (Kind::Density, 1, 0, Some(0)),
+        ] {
+            let asked = 50_000;
+            let mesh = kind.generate(asked, 7).unwrap();
+            assert_eq!(mesh, kind.generate(asked, 7).unwrap(), "{kind:?}");
+            assert_ne!(mesh, kind.generate(asked, 8).unwrap(), "{kind:?}");
+            let found = info(mesh, true).unwrap();
+            assert!(found.triangles.abs_diff(asked) < asked / 5, "{found:?}");
+            assert_eq!(faults(&found), 0, "{kind:?}: {found:?}");
+            assert_eq!(found.components, components, "{kind:?}");
+            assert_eq!(found.boundary_loops, boundary_loops, "{kind:?}");
+            match genus {
+                Some(genus) => assert_eq!(found.genus, Some(genus), "{kind:?}"),
+                None => assert!(found.genus > Some(100), "{kind:?}: {:?}", found.genus),
+            }
+        }
+    }
+
+    fn faults(found: &Info) -> usize {
+        found.cleaning.welded_vertices
+            + found.cleaning.dropped_isolated_vertices
+            + found.non_manifold_edges
+            + found.non_manifold_vertices
+            + found.inconsistent_edges
+            + found.zero_area_faces
+    }
+
+    /// Seen from outside, the triangles of a closed surface turn counter-clockwise: the volume is
+    /// positive.
+    #[test]
+    fn closed_kinds_have_their_inside_within() {
+        for kind in [Kind::Gyroid, Kind::Plinth, Kind::Density] {
+            let mesh = kind.generate(20_000, 1).unwrap();
+            let volume: f32 = mesh
+                .triangles()
+                .iter()
+                .map(|t| t.map(|v| mesh.positions()[v as usize]))
+                .map(|[a, b, c]| a.cross(b).dot(c) / 6.0)
+                .sum();
+            assert!(volume > 0.1, "{kind:?}: {volume}");
+        }
+    }
+}
