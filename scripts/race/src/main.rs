@@ -1,54 +1,39 @@
-//! The `race` program: calls a simplifier on a mesh file and prints what the call took. The only
-//! place that prints and exits.
+//! The `race` program: times simplifiers on meshes and makes such meshes. The only place that prints
+//! and exits.
 
+mod against;
+mod cli;
+mod fast_simplification;
+mod generate;
 mod measure;
 mod meshoptimizer;
+mod random;
+mod shuffle;
+mod subdivide;
+mod table;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
-use decimate::error::Result;
+use clap::Parser;
+use decimate::error::{Error, Result};
+use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{self, ReadOptions, WriteOptions};
 
-use measure::{Measured, measure};
-
-/// Measures calls of simplifiers that are linked in.
-#[derive(Debug, Parser)]
-#[command(version, max_term_width = 100)]
-struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(Debug, Subcommand)]
-enum Command {
-    /// Simplifies with meshoptimizer's simplifyWithUpdate and prints the seconds and megabytes of
-    /// the call alone as JSON.
-    Simplify(SimplifyArgs),
-}
-
-#[derive(Debug, Args)]
-struct SimplifyArgs {
-    /// The mesh, welded already: PLY, OBJ, STL or OFF.
-    mesh: PathBuf,
-    /// How many triangles to keep.
-    triangles: usize,
-    /// Where the result goes, without the vertices that no triangle uses.
-    #[arg(value_name = "OUT.ply")]
-    output: PathBuf,
-}
+use against::{Case, Contest};
+use cli::{AgainstArgs, Cli, Command, GenerateArgs, ShuffleArgs, SimplifyArgs};
+use measure::measure;
+use subdivide::subdivide;
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
-        Command::Simplify(args) => simplify(&args.mesh, args.triangles, &args.output),
+        Command::Simplify(args) => simplify(&args),
+        Command::Against(args) => race(&args),
+        Command::Generate(args) => generate(&args),
+        Command::Shuffle(args) => shuffle(&args),
     };
     match done {
-        Ok(measured) => {
-            let numbers = serde_json::to_string(&measured).expect("two numbers are JSON");
-            println!("{numbers}");
-            ExitCode::SUCCESS
-        }
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::FAILURE
@@ -56,9 +41,60 @@ fn main() -> ExitCode {
     }
 }
 
-fn simplify(mesh: &Path, triangles: usize, output: &Path) -> Result<Measured> {
-    let mut arrays = meshoptimizer::Arrays::from(io::read(mesh, &ReadOptions::default())?);
-    let ((), measured) = measure(|| arrays.simplify_with_update(triangles));
-    io::write(output, &arrays.into_mesh()?, &WriteOptions::default())?;
-    Ok(measured)
+fn simplify(args: &SimplifyArgs) -> Result<()> {
+    let mut arrays = meshoptimizer::Arrays::from(&read(&args.mesh)?);
+    let ((), measured) = measure(|| arrays.simplify_with_update(args.triangles));
+    write(&args.output, &arrays.into_mesh()?)?;
+    let numbers = serde_json::to_string(&measured).expect("two numbers are JSON");
+    println!("{numbers}");
+    Ok(())
+}
+
+fn race(args: &AgainstArgs) -> Result<()> {
+    let settings = against::settings(args)?;
+    let python = args.fast_simplification.as_ref();
+    let mut cases = Vec::new();
+    println!("{}", table::head(python.is_some()));
+    for path in &args.meshes {
+        let contest = Contest::new(path, &settings, python)?;
+        for &ratio in &args.ratios {
+            let case = contest.run(ratio, args.runs)?;
+            print!("{}", table::Rows(&case));
+            cases.push(case);
+        }
+    }
+    args.json
+        .as_ref()
+        .map_or(Ok(()), |path| write_json(path, &cases))
+}
+
+fn write_json(path: &Path, cases: &[Case]) -> Result<()> {
+    let text = serde_json::to_string_pretty(cases).expect("names and numbers are JSON");
+    std::fs::write(path, text + "\n").map_err(|source| Error::Io {
+        path: path.into(),
+        action: "cannot write",
+        source,
+    })
+}
+
+fn generate(args: &GenerateArgs) -> Result<()> {
+    write(
+        &args.output,
+        &args.kind.generate(args.triangles as usize, args.seed)?,
+    )
+}
+
+fn shuffle(args: &ShuffleArgs) -> Result<()> {
+    let mesh = (0..args.subdivide).try_fold(read(&args.mesh)?, |mesh, _| subdivide(mesh))?;
+    write(&args.output, &shuffle::shuffle(&mesh, args.seed)?)
+}
+
+fn read(path: &Path) -> Result<IndexedMesh> {
+    io::read(path, &ReadOptions::default())
+}
+
+fn write(path: &Path, mesh: &IndexedMesh) -> Result<()> {
+    io::write(path, mesh, &WriteOptions::default())?;
+    eprintln!("{}: {} triangles", path.display(), mesh.triangle_count());
+    Ok(())
 }

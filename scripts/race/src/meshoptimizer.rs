@@ -14,8 +14,8 @@ pub struct Arrays {
     origin: DVec3,
 }
 
-impl From<IndexedMesh> for Arrays {
-    fn from(mesh: IndexedMesh) -> Self {
+impl From<&IndexedMesh> for Arrays {
+    fn from(mesh: &IndexedMesh) -> Self {
         Self {
             indices: mesh.sides().flatten().collect(),
             positions: mesh.positions().iter().map(|p| p.to_array()).collect(),
@@ -42,6 +42,11 @@ impl Arrays {
             None,
         );
         self.indices.truncate(kept);
+    }
+
+    /// The number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.indices.len() / 3
     }
 
     /// The mesh of these arrays, without the vertices that no triangle uses.
