@@ -19,7 +19,8 @@
 //!
 //! Data flows one way: [`io`] makes an [`indexed_mesh::IndexedMesh`], [`clean`] makes a simplicial
 //! complex of it, [`decimate`] turns it into another over a [`mesh::Mesh`] in one of three memory
-//! tiers, [`io`] writes it, [`metrics`] says what is in it.
+//! tiers, [`io`] writes it, [`metrics`] says what is in it. [`spatial`] puts positions in an order in
+//! which neighbours stand together.
 //!
 //! # Limits
 //! At most 2³¹−1 directed edges (715 million triangles) and 2³¹−1 vertices. Coordinates are single
@@ -35,3 +36,4 @@ pub mod metrics;
 pub mod nearest;
 #[cfg(test)]
 mod shapes;
+pub mod spatial;

@@ -10,16 +10,24 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 8] = [
+const ARROWS: [(&str, &[&str]); 9] = [
     ("error", &[]),
     ("indexed_mesh", &["error"]),
     ("mesh", &[]),
     ("nearest", &[]),
-    ("clean", &["error", "indexed_mesh"]),
+    ("spatial", &[]),
+    ("clean", &["error", "indexed_mesh", "spatial"]),
     ("io", &["error", "indexed_mesh"]),
     (
         "decimate",
-        &["error", "indexed_mesh", "clean", "mesh", "nearest"],
+        &[
+            "error",
+            "indexed_mesh",
+            "clean",
+            "mesh",
+            "nearest",
+            "spatial",
+        ],
     ),
     (
         "metrics",
