@@ -78,6 +78,31 @@ impl IndexedMesh {
         })
     }
 
+    /// A mesh of parts known to be valid: taken from a mesh, fewer of them, and renamed.
+    pub(crate) fn from_valid(parts: Parts) -> Self {
+        let Parts {
+            origin,
+            positions,
+            triangles,
+            double_sided,
+            weights,
+        } = parts;
+        if cfg!(debug_assertions) {
+            Self::with_origin(origin, positions, triangles)
+                .and_then(|mesh| mesh.with_double_sided(double_sided))
+                .and_then(|mesh| mesh.with_weights(weights))
+                .expect("the parts are those of a mesh")
+        } else {
+            Self {
+                origin,
+                positions,
+                triangles,
+                double_sided: some_or_none(double_sided, |&is_double| is_double),
+                weights: some_or_none(weights, |&w| w != 1.0),
+            }
+        }
+    }
+
     /// The point that [`positions`](Self::positions) are relative to.
     pub fn origin(&self) -> DVec3 {
         self.origin
@@ -116,11 +141,7 @@ impl IndexedMesh {
                 self.triangles.len()
             )));
         }
-        self.double_sided = if double_sided.contains(&true) {
-            double_sided
-        } else {
-            Vec::new()
-        };
+        self.double_sided = some_or_none(double_sided, |&is_double| is_double);
         Ok(self)
     }
 
@@ -149,11 +170,7 @@ impl IndexedMesh {
                 weights[v]
             )));
         }
-        self.weights = if weights.iter().any(|&w| w != 1.0) {
-            weights
-        } else {
-            Vec::new()
-        };
+        self.weights = some_or_none(weights, |&w| w != 1.0);
         Ok(self)
     }
 
@@ -214,6 +231,15 @@ impl IndexedMesh {
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.double_sided.capacity()
             + self.weights.capacity() * size_of::<f32>()
+    }
+}
+
+/// The list where it says something of any element, else the empty list, which says the same.
+fn some_or_none<T>(list: Vec<T>, says_something: impl Fn(&T) -> bool) -> Vec<T> {
+    if list.iter().any(says_something) {
+        list
+    } else {
+        Vec::new()
     }
 }
 

@@ -137,12 +137,17 @@ fn sort_places(places: &mut Vec<u64>, positions: &[Vec3]) {
             deal(spare, bucket, AXIS_BITS);
         }
         for cell in bucket.chunk_by_mut(|&a, &b| code(a) == code(b)) {
-            let key = |&c: &u64| by_position(positions[id(c) as usize], id(c));
-            match cell.len() {
-                1 => {}
-                // The few copies of one vertex; the parallel sort is slower to start.
-                2..SHORT => cell.sort_unstable_by_key(key),
-                _ => cell.par_sort_unstable_by_key(key),
+            let at = |&c: &u64| positions[id(c) as usize];
+            // A vertex and its copies stand in order already.
+            let first = at(&cell[0]);
+            if cell[1..].iter().all(|c| at(c) == first) {
+                continue;
+            }
+            let key = |c: &u64| by_position(at(c), id(*c));
+            if cell.len() < SHORT {
+                cell.sort_unstable_by_key(key);
+            } else {
+                cell.par_sort_unstable_by_key(key);
             }
         }
     });
