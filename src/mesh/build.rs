@@ -1,15 +1,15 @@
 //! Builds connectivity from triangles in linear time: pairs opposites, finds the fans, fills the
 //! side tables.
 
-use super::link::{Opposite, Outgoing};
+use super::link::{Opposite, OppositeWord, Outgoing, OutgoingWord};
 use super::{EdgeId, EdgeStore, Mesh, SideTable, VertexId};
 
 impl<S: EdgeStore> Mesh<S> {
     /// The connectivity of these triangles over `vertices` vertices.
     ///
     /// Linear time, but for a logarithm in the number of edges at the vertices that are not
-    /// manifold. Needs 12 bytes a triangle and 8 a vertex beside the mesh while it runs; 3 more a
-    /// triangle where something is not manifold.
+    /// manifold. Needs 12 bytes a triangle beside the mesh while it runs, or 24 and 8 a vertex
+    /// beside the mesh's vertices; 3 more a triangle where something is not manifold.
     ///
     /// # Panics
     /// Where a triangle names a vertex that is not there or one vertex twice, or 3m exceeds 2³¹−1.
@@ -19,143 +19,39 @@ impl<S: EdgeStore> Mesh<S> {
             triangles.len() <= i32::MAX as usize / 3,
             "too many triangles"
         );
-        // Without a way out in the middle, so that several triangles are looked at at once.
-        let are_proper = triangles.iter().fold(true, |all, &[a, b, c]| {
-            let is_there = (a.max(b).max(c) as usize) < vertices;
-            all & is_there & (a != b) & (b != c) & (c != a)
-        });
-        assert!(are_proper, "a triangle needs three vertices of the mesh");
+        let corners = Corners::of(vertices, triangles);
+        let mut links = Links::of(&corners);
+        links.add_edge_rows(&corners);
+        let edges = links.edges_of_several_fans(&corners);
+        drop(corners);
         let mut mesh = Self {
-            store: S::from_triangles(triangles),
-            outgoing: vec![Outgoing::None.into(); vertices],
-            edge_rows: SideTable::default(),
+            store: S::from_triangles(triangles, &links.opposites),
+            outgoing: links.outgoing,
+            edge_rows: links.edge_rows,
             fan_rows: SideTable::default(),
             live_faces: triangles.len(),
-            live_vertices: 0,
+            live_vertices: links.settled,
         };
-        let corners = Corners::of(vertices, triangles);
-        let mut left = mesh.pair_opposites(&corners);
-        mesh.add_edge_rows(&corners, &mut left);
-        mesh.add_fans(&corners, left.fans);
+        drop(links.opposites);
+        mesh.add_fans(&edges);
         mesh
     }
 
-    /// Pairs opposites vertex by vertex, and finds the fan of each vertex that has only one.
-    ///
-    /// ```text
-    ///     x ──in──> v ──out──> y      of each corner of v: the edge that comes in, the one that goes
-    ///                                 out; behind a corner in its fan comes the one whose `out` is
-    ///                                 the opposite of `in`
-    /// ```
-    ///
-    /// Each edge comes in at one vertex, and finds there the edge that goes out to where it comes
-    /// from. An edge that is not manifold has two that go out to the same vertex: what is found at
-    /// its ends is wrong.
-    fn pair_opposites(&mut self, corners: &Corners) -> LeftOver {
-        let mut left = LeftOver::default();
-        // The place in the list of the corner whose edge goes out to a vertex, counted from 1: what
-        // is no greater than where the list of a vertex begins was left by a vertex before it.
-        let mut going_to = vec![0u32; self.vertex_slots()];
-        let mut behind: Vec<u32> = Vec::new();
-        let mut begin = 0;
-        for (v, &end) in corners.ends.iter().enumerate() {
-            let of_v = &corners.list[begin as usize..end as usize];
-            for (place, &out) in (begin + 1..).zip(of_v) {
-                let y = corners.tails[next(out)] as usize;
-                if std::mem::replace(&mut going_to[y], place) > begin {
-                    left.crowded.push(VertexId::new(v.min(y)));
-                }
-            }
-            // An open fan is closed from its last corner to its first, which is what all places
-            // but those behind another add up to.
-            let (mut first, mut last, mut open_fans) = (0u32, 0, 0);
-            behind.clear();
-            for (i, &out) in (0..).zip(of_v) {
-                let before = prev(out);
-                let place = going_to[corners.tails[before] as usize];
-                let mut next = 0;
-                if place > begin {
-                    next = place - begin - 1;
-                    let mate = EdgeId::new(of_v[next as usize] as usize);
-                    self.set_opposite(EdgeId::new(before), Opposite::Edge(mate));
-                } else {
-                    (last, open_fans) = (i as usize, open_fans + 1);
-                }
-                first = first.wrapping_add(i).wrapping_sub(next);
-                behind.push(next);
-            }
-            if open_fans == 1 {
-                behind[last] = first;
-            }
-            if open_fans < 2 && is_one_cycle(&behind, first) {
-                let start = EdgeId::new(of_v[first as usize] as usize);
-                self.add_fan(VertexId::new(v), start);
-            } else if !of_v.is_empty() {
-                left.fans.push(VertexId::new(v));
-            }
-            begin = end;
-        }
-        left
-    }
-
-    /// Gives every edge that is not manifold its row, in the order of their smaller ends, then of
-    /// their larger ends; forgets the fans at both.
-    fn add_edge_rows(&mut self, corners: &Corners, left: &mut LeftOver) {
-        left.crowded.sort_unstable();
-        left.crowded.dedup();
-        let mut sides: Vec<(u32, EdgeId)> = Vec::new();
-        for &v in &left.crowded {
-            sides.clear();
-            for &out in corners.of_vertex(v) {
-                sides.push((corners.tails[next(out)], EdgeId::new(out as usize)));
-                sides.push((corners.tails[prev(out)], EdgeId::new(prev(out))));
-            }
-            sides.sort_unstable();
-            for edge in sides.chunk_by(|a, b| a.0 == b.0) {
-                let other = VertexId::new(edge[0].0 as usize);
-                let is_manifold = match *edge {
-                    [_] => true,
-                    [(_, a), (_, b)] => self.tail(a) == self.head(b),
-                    _ => false,
-                };
-                if is_manifold || other < v {
-                    continue;
-                }
-                let row = self
-                    .edge_rows
-                    .insert(edge.iter().map(|&(_, e)| e).collect());
-                for &(_, e) in edge {
-                    self.set_opposite(e, Opposite::NonManifold(row));
-                }
-                for end in [v, other] {
-                    self.live_vertices -= usize::from(self.outgoing(end) != Outgoing::None);
-                    self.set_outgoing(end, Outgoing::None);
-                    left.fans.push(end);
-                }
-            }
-        }
-    }
-
-    /// Finds the fans of these vertices by walking, in the order of their smallest edges.
-    fn add_fans(&mut self, corners: &Corners, mut vertices: Vec<VertexId>) {
-        if vertices.is_empty() {
+    /// Adds the fans that these edges, ascending, lie in.
+    fn add_fans(&mut self, edges: &[u32]) {
+        if edges.is_empty() {
             return;
         }
-        vertices.sort_unstable();
-        vertices.dedup();
-        let of_vertex = |&v: &VertexId| corners.of_vertex(v).iter().map(|&e| e as usize);
-        let mut edges: Vec<usize> = vertices.iter().flat_map(of_vertex).collect();
-        edges.sort_unstable();
         let mut seen = vec![false; self.store.slots()];
-        for e in edges {
-            if seen[e] {
+        for e in edges.iter().map(|&e| EdgeId::new(e as usize)) {
+            if seen[e.index()] {
                 continue;
             }
-            let start = self.fan_start(EdgeId::new(e));
+            let start = self.fan_start(e);
             for e in self.fan(start) {
                 seen[e.index()] = true;
             }
-            self.add_fan(self.tail(start), start);
+            self.add_fan(self.tail(e), start);
         }
         self.fan_rows.sort_all();
     }
@@ -177,17 +73,9 @@ impl<S: EdgeStore> Mesh<S> {
     }
 }
 
-/// What pairing vertex by vertex leaves to do.
-#[derive(Default)]
-struct LeftOver {
-    /// The smaller end of every edge that is not manifold, some more than once.
-    crowded: Vec<VertexId>,
-    /// The vertices whose fans are not found yet.
-    fans: Vec<VertexId>,
-}
-
-/// The corners of each vertex, ascending. Corner 3i+k of triangle i is also the edge that goes out
-/// there.
+/// The corners of each vertex, ascending.
+///
+/// Corner 3i+k of triangle i is the directed edge that goes out there.
 struct Corners<'a> {
     /// The vertex of each corner: the tail of its edge.
     tails: &'a [u32],
@@ -199,16 +87,21 @@ struct Corners<'a> {
 impl<'a> Corners<'a> {
     /// Sorts the corners by vertex, counting.
     fn of(vertices: usize, triangles: &'a [[u32; 3]]) -> Self {
-        let tails = triangles.as_flattened();
         let mut ends = vec![0u32; vertices];
-        for &v in tails {
-            ends[v as usize] += 1;
+        let mut are_proper = true;
+        for t in triangles {
+            are_proper &= (t[0] != t[1]) & (t[1] != t[2]) & (t[2] != t[0]);
+            for &v in t {
+                ends[v as usize] += 1;
+            }
         }
+        assert!(are_proper, "a triangle needs three different vertices");
         let mut begin = 0;
         for end in &mut ends {
             begin += std::mem::replace(end, begin);
         }
         // Filling moves each begin to its end.
+        let tails = triangles.as_flattened();
         let mut list = vec![0u32; tails.len()];
         for (corner, &v) in (0..).zip(tails) {
             let end = &mut ends[v as usize];
@@ -218,40 +111,196 @@ impl<'a> Corners<'a> {
         Self { tails, list, ends }
     }
 
-    fn of_vertex(&self, v: VertexId) -> &[u32] {
-        let begin = v.index().checked_sub(1).map_or(0, |v| self.ends[v]);
-        &self.list[begin as usize..self.ends[v.index()] as usize]
+    fn of_vertex(&self, v: u32) -> &[u32] {
+        let begin = v.checked_sub(1).map_or(0, |v| self.ends[v as usize]);
+        &self.list[begin as usize..self.ends[v as usize] as usize]
+    }
+
+    /// The number of corners at the busiest vertex.
+    fn most(&self) -> usize {
+        let counts = self.ends.windows(2).map(|ends| ends[1] - ends[0]);
+        let first = self.ends.first().copied();
+        counts.chain(first).max().unwrap_or(0) as usize
     }
 }
 
 /// The corner behind this one in its triangle.
 #[inline(always)]
-fn next(corner: u32) -> usize {
-    (if corner % 3 == 2 {
+fn next(corner: u32) -> u32 {
+    if corner % 3 == 2 {
         corner - 2
     } else {
         corner + 1
-    }) as usize
+    }
 }
 
 /// The corner before this one in its triangle.
 #[inline(always)]
-fn prev(corner: u32) -> usize {
-    (if corner.is_multiple_of(3) {
+fn prev(corner: u32) -> u32 {
+    if corner.is_multiple_of(3) {
         corner + 2
     } else {
         corner - 1
-    }) as usize
+    }
 }
 
-/// Whether all places follow each other on one cycle through `first`.
-fn is_one_cycle(behind: &[u32], first: u32) -> bool {
-    // As many steps as there are places, whatever is found: where a loop ends is guessed right
-    // then, and costs no wait for the walk.
-    let (mut at, mut returns) = (first as usize, 0);
+/// The words of all links, and what is left to do about them.
+struct Links {
+    opposites: Vec<OppositeWord>,
+    outgoing: Vec<OutgoingWord>,
+    edge_rows: SideTable,
+    /// The number of vertices whose outgoing edge is found.
+    settled: usize,
+    /// The vertices that have corners and several fans, or fans that are not found yet.
+    unsettled: Vec<u32>,
+    /// The smaller end of every edge that is not manifold, some more than once.
+    crowded: Vec<u32>,
+}
+
+impl Links {
+    /// Pairs opposites vertex by vertex, and finds the fan of each vertex that has only one.
+    ///
+    /// ```text
+    ///     x ──in──> v ──out──> y      of each corner of v: the edge that comes in, the one that goes
+    ///                                 out; behind it in its fan comes the corner whose `out` is the
+    ///                                 opposite of its `in`
+    /// ```
+    ///
+    /// Each edge comes in at one vertex, and finds there the edge that goes out to where it comes
+    /// from. An edge that is not manifold has two that go out to the same vertex: what is found at
+    /// its ends is wrong, and its smaller end crowded.
+    fn of(corners: &Corners) -> Self {
+        let Corners { tails, list, ends } = corners;
+        let mut links = Self {
+            opposites: vec![OppositeWord::BOUNDARY; list.len()],
+            outgoing: vec![Outgoing::None.into(); ends.len()],
+            edge_rows: SideTable::default(),
+            settled: 0,
+            unsettled: Vec::new(),
+            crowded: Vec::new(),
+        };
+        // Where in the list the corner is whose edge goes out to a vertex, counted from 1: what is
+        // no greater than where the list of a vertex begins was left by a vertex before it.
+        let mut going_to = vec![0u32; ends.len()];
+        let mut behind = vec![0u32; corners.most()];
+        let mut begin = 0;
+        for (v, &end) in (0..).zip(ends) {
+            let outs = &list[begin as usize..end as usize];
+            let behind = &mut behind[..outs.len()];
+            for (place, &out) in (begin + 1..).zip(outs) {
+                let y = tails[next(out) as usize];
+                if std::mem::replace(&mut going_to[y as usize], place) > begin {
+                    links.crowded.push(v.min(y));
+                }
+            }
+            let mut paired = 0;
+            for (behind, &out) in behind.iter_mut().zip(outs) {
+                let before = prev(out) as usize;
+                *behind = going_to[tails[before] as usize].wrapping_sub(begin + 1);
+                if let Some(&mate) = outs.get(*behind as usize) {
+                    let mate = EdgeId::new(mate as usize);
+                    links.opposites[before] = Opposite::Edge(mate).into();
+                    paired += 1;
+                }
+            }
+            let first = if paired == outs.len() {
+                Some(0)
+            } else {
+                close_open_fan(behind)
+            };
+            match first {
+                Some(first) if is_one_cycle(behind, first) => {
+                    let start = EdgeId::new(outs[first] as usize);
+                    links.outgoing[v as usize] = Outgoing::Fan(start).into();
+                    links.settled += 1;
+                }
+                _ if outs.is_empty() => {}
+                _ => links.unsettled.push(v),
+            }
+            begin = end;
+        }
+        links
+    }
+
+    /// Gives every edge that is not manifold its row, in the order of their smaller ends, then of
+    /// their larger ends; unsettles both.
+    fn add_edge_rows(&mut self, corners: &Corners) {
+        self.crowded.sort_unstable();
+        self.crowded.dedup();
+        let mut sides: Vec<(u32, bool, EdgeId)> = Vec::new();
+        for &v in &self.crowded {
+            sides.clear();
+            for &out in corners.of_vertex(v) {
+                for (x, is_out, e) in [(next(out), true, out), (prev(out), false, prev(out))] {
+                    let x = corners.tails[x as usize];
+                    sides.push((x, is_out, EdgeId::new(e as usize)));
+                }
+            }
+            sides.sort_unstable();
+            for edge in sides.chunk_by(|a, b| a.0 == b.0) {
+                let is_manifold = match *edge {
+                    [_] => true,
+                    [(_, a, _), (_, b, _)] => a != b,
+                    _ => false,
+                };
+                let x = edge[0].0;
+                if is_manifold || x < v {
+                    continue;
+                }
+                let row = edge.iter().map(|&(.., e)| e).collect();
+                let row = Opposite::NonManifold(self.edge_rows.insert(row));
+                for (.., e) in edge {
+                    self.opposites[e.index()] = row.into();
+                }
+                for end in [v, x] {
+                    let outgoing = &mut self.outgoing[end as usize];
+                    self.settled -= usize::from(outgoing.decode() != Outgoing::None);
+                    *outgoing = Outgoing::None.into();
+                    self.unsettled.push(end);
+                }
+            }
+        }
+    }
+
+    /// The edges that leave unsettled vertices, ascending.
+    fn edges_of_several_fans(&mut self, corners: &Corners) -> Vec<u32> {
+        self.unsettled.sort_unstable();
+        self.unsettled.dedup();
+        let outs = self.unsettled.iter().map(|&v| corners.of_vertex(v));
+        let mut edges: Vec<u32> = outs.flatten().copied().collect();
+        edges.sort_unstable();
+        edges
+    }
+}
+
+/// Puts the first corner of the only open fan behind its last, and returns the first; nothing where
+/// several fans are open.
+///
+/// `behind` names no corner behind the last of an open fan.
+fn close_open_fan(behind: &mut [u32]) -> Option<usize> {
+    let mut last = None;
+    // What all corners but those behind another add up to.
+    let mut first = 0u32;
+    for (i, &next) in (0..).zip(&*behind) {
+        first = first.wrapping_add(i);
+        if (next as usize) < behind.len() {
+            first = first.wrapping_sub(next);
+        } else if last.replace(i).is_some() {
+            return None;
+        }
+    }
+    behind[last? as usize] = first;
+    Some(first as usize)
+}
+
+/// Whether all corners follow each other on one cycle through `first`.
+fn is_one_cycle(behind: &[u32], first: usize) -> bool {
+    // As many steps as there are corners, whatever is found: a loop that ends where the walk does
+    // would have the processor wait for the walk.
+    let (mut at, mut returns) = (first, 0);
     for _ in behind {
         at = behind.get(at).map_or(at, |&next| next as usize);
-        returns += u32::from(at == first as usize);
+        returns += u32::from(at == first);
     }
-    returns == 1 && at == first as usize
+    returns == 1 && at == first
 }
