@@ -8,8 +8,8 @@ impl<S: EdgeStore> Mesh<S> {
     /// The connectivity of these triangles over `vertices` vertices.
     ///
     /// Linear time, but for a logarithm in the number of edges at the vertices that are not
-    /// manifold. Needs 12 bytes a triangle beside the mesh while it runs, or 24 and 8 a vertex
-    /// beside the mesh's vertices; 3 more a triangle where something is not manifold.
+    /// manifold. Needs 48 bytes a triangle and 8 a vertex before the tier's words are made, 12 a
+    /// triangle beside them, 3 where something is not manifold.
     ///
     /// # Panics
     /// Where a triangle names a vertex that is not there or one vertex twice, or 3m exceeds 2³¹−1.
@@ -76,17 +76,39 @@ impl<S: EdgeStore> Mesh<S> {
 /// The corners of each vertex, ascending.
 ///
 /// Corner 3i+k of triangle i is the directed edge that goes out there.
-struct Corners<'a> {
-    /// The vertex of each corner: the tail of its edge.
-    tails: &'a [u32],
-    list: Vec<u32>,
+struct Corners {
+    list: Vec<Corner>,
     /// Where the corners of each vertex end in the list; they begin where those before end.
     ends: Vec<u32>,
 }
 
-impl<'a> Corners<'a> {
+/// A corner as its vertex v sees it.
+///
+/// ```text
+///     x ──> v ──out──> y      the edge that comes in from x is the one before `out` in the face
+/// ```
+#[derive(Clone, Copy, Default)]
+struct Corner {
+    out: u32,
+    x: u32,
+    y: u32,
+}
+
+impl Corner {
+    /// The edge that comes in.
+    #[inline(always)]
+    fn before(self) -> u32 {
+        if self.out.is_multiple_of(3) {
+            self.out + 2
+        } else {
+            self.out - 1
+        }
+    }
+}
+
+impl Corners {
     /// Sorts the corners by vertex, counting.
-    fn of(vertices: usize, triangles: &'a [[u32; 3]]) -> Self {
+    fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let mut ends = vec![0u32; vertices];
         let mut are_proper = true;
         for t in triangles {
@@ -101,17 +123,22 @@ impl<'a> Corners<'a> {
             begin += std::mem::replace(end, begin);
         }
         // Filling moves each begin to its end.
-        let tails = triangles.as_flattened();
-        let mut list = vec![0u32; tails.len()];
-        for (corner, &v) in (0..).zip(tails) {
-            let end = &mut ends[v as usize];
-            list[*end as usize] = corner;
-            *end += 1;
+        let mut list = vec![Corner::default(); 3 * triangles.len()];
+        for (first, &[a, b, c]) in (0..).step_by(3).zip(triangles) {
+            for (k, v, x, y) in [(0, a, c, b), (1, b, a, c), (2, c, b, a)] {
+                let end = &mut ends[v as usize];
+                list[*end as usize] = Corner {
+                    out: first + k,
+                    x,
+                    y,
+                };
+                *end += 1;
+            }
         }
-        Self { tails, list, ends }
+        Self { list, ends }
     }
 
-    fn of_vertex(&self, v: u32) -> &[u32] {
+    fn of_vertex(&self, v: u32) -> &[Corner] {
         let begin = v.checked_sub(1).map_or(0, |v| self.ends[v as usize]);
         &self.list[begin as usize..self.ends[v as usize] as usize]
     }
@@ -121,26 +148,6 @@ impl<'a> Corners<'a> {
         let counts = self.ends.windows(2).map(|ends| ends[1] - ends[0]);
         let first = self.ends.first().copied();
         counts.chain(first).max().unwrap_or(0) as usize
-    }
-}
-
-/// The corner behind this one in its triangle.
-#[inline(always)]
-fn next(corner: u32) -> u32 {
-    if corner % 3 == 2 {
-        corner - 2
-    } else {
-        corner + 1
-    }
-}
-
-/// The corner before this one in its triangle.
-#[inline(always)]
-fn prev(corner: u32) -> u32 {
-    if corner.is_multiple_of(3) {
-        corner + 2
-    } else {
-        corner - 1
     }
 }
 
@@ -170,7 +177,7 @@ impl Links {
     /// from. An edge that is not manifold has two that go out to the same vertex: what is found at
     /// its ends is wrong, and its smaller end crowded.
     fn of(corners: &Corners) -> Self {
-        let Corners { tails, list, ends } = corners;
+        let Corners { list, ends } = corners;
         let mut links = Self {
             opposites: vec![OppositeWord::BOUNDARY; list.len()],
             outgoing: vec![Outgoing::None.into(); ends.len()],
@@ -187,19 +194,17 @@ impl Links {
         for (v, &end) in (0..).zip(ends) {
             let outs = &list[begin as usize..end as usize];
             let behind = &mut behind[..outs.len()];
-            for (place, &out) in (begin + 1..).zip(outs) {
-                let y = tails[next(out) as usize];
-                if std::mem::replace(&mut going_to[y as usize], place) > begin {
-                    links.crowded.push(v.min(y));
+            for (place, corner) in (begin + 1..).zip(outs) {
+                if std::mem::replace(&mut going_to[corner.y as usize], place) > begin {
+                    links.crowded.push(v.min(corner.y));
                 }
             }
             let mut paired = 0;
-            for (behind, &out) in behind.iter_mut().zip(outs) {
-                let before = prev(out) as usize;
-                *behind = going_to[tails[before] as usize].wrapping_sub(begin + 1);
-                if let Some(&mate) = outs.get(*behind as usize) {
-                    let mate = EdgeId::new(mate as usize);
-                    links.opposites[before] = Opposite::Edge(mate).into();
+            for (behind, corner) in behind.iter_mut().zip(outs) {
+                *behind = going_to[corner.x as usize].wrapping_sub(begin + 1);
+                if let Some(mate) = outs.get(*behind as usize) {
+                    let mate = EdgeId::new(mate.out as usize);
+                    links.opposites[corner.before() as usize] = Opposite::Edge(mate).into();
                     paired += 1;
                 }
             }
@@ -210,7 +215,7 @@ impl Links {
             };
             match first {
                 Some(first) if is_one_cycle(behind, first) => {
-                    let start = EdgeId::new(outs[first] as usize);
+                    let start = EdgeId::new(outs[first].out as usize);
                     links.outgoing[v as usize] = Outgoing::Fan(start).into();
                     links.settled += 1;
                 }
@@ -230,11 +235,9 @@ impl Links {
         let mut sides: Vec<(u32, bool, EdgeId)> = Vec::new();
         for &v in &self.crowded {
             sides.clear();
-            for &out in corners.of_vertex(v) {
-                for (x, is_out, e) in [(next(out), true, out), (prev(out), false, prev(out))] {
-                    let x = corners.tails[x as usize];
-                    sides.push((x, is_out, EdgeId::new(e as usize)));
-                }
+            for c in corners.of_vertex(v) {
+                sides.push((c.x, false, EdgeId::new(c.before() as usize)));
+                sides.push((c.y, true, EdgeId::new(c.out as usize)));
             }
             sides.sort_unstable();
             for edge in sides.chunk_by(|a, b| a.0 == b.0) {
@@ -266,8 +269,8 @@ impl Links {
     fn edges_of_several_fans(&mut self, corners: &Corners) -> Vec<u32> {
         self.unsettled.sort_unstable();
         self.unsettled.dedup();
-        let outs = self.unsettled.iter().map(|&v| corners.of_vertex(v));
-        let mut edges: Vec<u32> = outs.flatten().copied().collect();
+        let of_all = self.unsettled.iter().flat_map(|&v| corners.of_vertex(v));
+        let mut edges: Vec<u32> = of_all.map(|corner| corner.out).collect();
         edges.sort_unstable();
         edges
     }
