@@ -11,7 +11,7 @@ use crate::spatial::Grid;
 
 /// The vertices of a chunk, at least and at most. A chunk's mesh and all that goes with it then
 /// take half a megabyte to one.
-const CHUNK_VERTICES: Range<usize> = 3072..6144;
+const CHUNK_VERTICES: Range<usize> = 2048..4096;
 
 /// A chunk ends at a multiple of this.
 const GROUP: usize = 64;

@@ -6,13 +6,13 @@ use glam::Vec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::cost::{Cost, Evaluation};
+use super::cost::{Cost, Evaluation, LANES};
 use super::options::Topology;
 use super::queue::{Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
 use super::surface::{Loss, Merged, Surface};
 use crate::error::{Error, Result};
-use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
+use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, VertexId};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +60,24 @@ enum Rejection {
 enum Way {
     Collapse,
     Contract(Contraction, Loss),
+}
+
+/// Edges that wait to be evaluated together.
+#[derive(Clone, Copy)]
+struct Batch {
+    edges: [EdgeId; LANES],
+    held: [[bool; 2]; LANES],
+    count: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            edges: [EdgeId::new(0); LANES],
+            held: [[false; 2]; LANES],
+            count: 0,
+        }
+    }
 }
 
 /// A part of the surface that hangs together with nothing else.
@@ -128,12 +146,12 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
     /// Queues every edge that `choose` takes; evaluated in parallel. Whether there is one.
     fn queue_all(&mut self, choose: impl Fn(&Self, &Candidate) -> bool + Sync) -> bool {
         let slots = self.surface.mesh.face_slots();
-        let candidates_of = |greedy: &Self, f: FaceId, to: &mut Vec<Candidate>| {
+        let candidates_of = |greedy: &Self, f: FaceId, batch: &mut Batch, to: &mut Vec<Candidate>| {
             let mesh = &greedy.surface.mesh;
             if mesh.is_live_face(f) {
-                let names = f.edges().into_iter().filter(|&e| mesh.canonical(e) == e);
-                let candidates = names.filter_map(|e| greedy.candidate(e));
-                to.extend(candidates.filter(|c| choose(greedy, c)));
+                for e in f.edges().into_iter().filter(|&e| mesh.canonical(e) == e) {
+                    greedy.evaluate_in(batch, Some(e), |c| to.extend(Some(c).filter(|c| choose(greedy, c))));
+                }
             }
         };
         let mut is_any = false;
@@ -145,8 +163,16 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                 .into_par_iter()
                 .with_min_len(PART_FACES)
                 .map(FaceId::new)
-                .fold(Vec::new, |mut part, f| {
-                    candidates_of(greedy, f, &mut part);
+                .fold(
+                    || (Batch::default(), Vec::new()),
+                    |(mut batch, mut part), f| {
+                        candidates_of(greedy, f, &mut batch, &mut part);
+                        (batch, part)
+                    },
+                )
+                .map(|(mut batch, mut part)| {
+                    let take = |c| part.extend(Some(c).filter(|c| choose(greedy, c)));
+                    greedy.evaluate_in(&mut batch, None, take);
                     part
                 })
                 .collect();
@@ -253,10 +279,8 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                     let faces_before = faces + merged.collapse.dead_faces.len();
                     if faces < exact_below && faces_before >= exact_below {
                         self.queue_all(|_, _| true);
-                    } else if C::MAY_FALL {
-                        self.reconsider();
                     } else {
-                        self.complete(merged.collapse.kept);
+                        self.reconsider();
                     }
                     if self.tally.collapses.is_multiple_of(1024)
                         && progress(self.triangles).is_break()
@@ -285,15 +309,53 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         (self.surface, self.cost, self.tally)
     }
 
+    #[inline]
     fn evaluate(&self, e: EdgeId) -> Option<Evaluation> {
-        self.cost.evaluate(&self.surface, e, self.surface.held(e))
+        let held = self.surface.held(e);
+        if held == [true; 2] {
+            return None;
+        }
+        let [evaluation, ..] = self.cost.evaluate(&self.surface, &[e; LANES], &[held; LANES]);
+        evaluation
     }
 
-    fn candidate(&self, edge: EdgeId) -> Option<Candidate> {
-        let cost = self.evaluate(edge).map(|evaluation| evaluation.cost);
-        let cheaper = cost.into_iter().chain(self.fill_price(edge));
-        let cost = cheaper.reduce(f64::min)? as f32;
-        Some(Candidate { cost, edge })
+    /// Adds an edge to a batch, or none to evaluate what is in it, and gives the candidates of those
+    /// that were evaluated.
+    #[inline]
+    fn evaluate_in(&self, batch: &mut Batch, e: Option<EdgeId>, mut give: impl FnMut(Candidate)) {
+        if let Some(edge) = e {
+            let held = self.surface.held(edge);
+            if held == [true; 2] {
+                let price = self.fill_price(edge);
+                price.into_iter().for_each(|price| {
+                    give(Candidate {
+                        cost: price as f32,
+                        edge,
+                    });
+                });
+                return;
+            }
+            batch.edges[batch.count] = edge;
+            batch.held[batch.count] = held;
+            batch.count += 1;
+        }
+        if batch.count < if e.is_some() { LANES } else { 1 } {
+            return;
+        }
+        for lane in batch.count..LANES {
+            batch.edges[lane] = batch.edges[0];
+            batch.held[lane] = batch.held[0];
+        }
+        let evaluations = self.cost.evaluate(&self.surface, &batch.edges, &batch.held);
+        for (evaluation, &edge) in evaluations.iter().zip(&batch.edges[..batch.count]) {
+            let cost = evaluation.map(|evaluation| evaluation.cost);
+            let cheaper = cost.into_iter().chain(self.fill_price(edge));
+            if let Some(cost) = cheaper.reduce(f64::min) {
+                let cost = cost as f32;
+                give(Candidate { cost, edge });
+            }
+        }
+        batch.count = 0;
     }
 
     /// Whether the topology may change here: not where creases are to be kept.
@@ -326,17 +388,6 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
     fn goes_by_another_name(&self, e: EdgeId) -> bool {
         let name = self.surface.mesh.canonical(e);
         name != e && self.queue.contains(name)
-    }
-
-    /// Whether the edge has a candidate, by whatever name.
-    #[inline]
-    fn is_queued(&self, e: EdgeId) -> bool {
-        self.queue.contains(e)
-            || match self.surface.mesh.opposite(e) {
-                Opposite::Edge(o) => self.queue.contains(o),
-                Opposite::Boundary => false,
-                Opposite::NonManifold(_) => self.queue.contains(self.surface.mesh.canonical(e)),
-            }
     }
 
     /// How `e` can be collapsed to `position` and the deviation after it, or why it cannot.
@@ -488,8 +539,12 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             self.free_vertices.push(merged.collapse.removed);
             for e in std::mem::take(&mut self.waiting) {
                 if self.surface.mesh.is_live_face(e.face()) {
-                    let candidate = self.candidate(self.surface.mesh.canonical(e));
-                    candidate.into_iter().for_each(|c| self.queue.push(c));
+                    let mut batch = Batch::default();
+                    let mut found = None;
+                    let name = self.surface.mesh.canonical(e);
+                    self.evaluate_in(&mut batch, Some(name), |c| found = Some(c));
+                    self.evaluate_in(&mut batch, None, |c| found = Some(c));
+                    found.into_iter().for_each(|c| self.queue.push(c));
                 }
             }
         }
@@ -499,55 +554,39 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         merged
     }
 
-    /// Evaluates the edges at a vertex that have no candidate.
-    #[inline]
-    fn complete(&mut self, v: VertexId) {
-        let mut missing: SmallVec<[EdgeId; 4]> = SmallVec::new();
-        let mesh = &self.surface.mesh;
-        for start in mesh.fans(v) {
-            let mut end = start;
-            for e in mesh.fan(start) {
-                if !self.is_queued(e) {
-                    missing.push(e);
-                }
-                end = mesh.prev(e);
-            }
-            if mesh.mate(start).is_none() && !self.is_queued(end) {
-                missing.push(end);
-            }
-        }
-        for e in missing {
-            let name = self.surface.mesh.canonical(e);
-            if let Some(candidate) = self.candidate(name) {
-                self.queue.push(candidate);
-            }
-        }
-    }
-
     /// Evaluates the edges at the changed vertices, each once.
     fn reconsider(&mut self) {
-        let now = self.tally.collapses as u32;
-        for &v in &self.changed {
-            self.changed_at[v.index()] = now;
-        }
         let mut edges = std::mem::take(&mut self.edges);
         edges.clear();
+        let now = self.tally.collapses as u32;
+        let is_one = self.changed.len() == 1;
+        if !is_one {
+            for &v in &self.changed {
+                self.changed_at[v.index()] = now;
+            }
+        }
+        let mesh = &self.surface.mesh;
         for &v in &self.changed {
-            for start in self.surface.mesh.fans(v) {
-                let mut end = start;
-                for e in self.surface.mesh.fan(start) {
-                    edges.extend(self.name_at(v, self.surface.mesh.head(e), e, now));
-                    end = self.surface.mesh.prev(e);
+            for start in mesh.fans(v) {
+                let mut end = None;
+                for e in mesh.fan(start) {
+                    if is_one && mesh.mate(e).is_some() {
+                        edges.push(mesh.canonical(e));
+                    } else {
+                        edges.extend(self.name_at(v, mesh.head(e), e, now));
+                    }
+                    end = Some(mesh.prev(e)).filter(|&before| mesh.mate(before).is_none());
                 }
-                if self.surface.mesh.mate(start).is_none() {
-                    edges.extend(self.name_at(v, self.surface.mesh.tail(end), end, now));
+                if let Some(end) = end {
+                    edges.extend(self.name_at(v, mesh.tail(end), end, now));
                 }
             }
         }
-        for &e in &edges {
-            if let Some(candidate) = self.candidate(e) {
-                self.queue.push(candidate);
-            }
+        let mut found: SmallVec<[Candidate; LANES]> = SmallVec::new();
+        let mut batch = Batch::default();
+        for e in edges.iter().copied().map(Some).chain([None]) {
+            self.evaluate_in(&mut batch, e, |candidate| found.push(candidate));
+            found.drain(..).for_each(|candidate| self.queue.push(candidate));
         }
         self.edges = edges;
     }

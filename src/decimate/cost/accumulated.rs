@@ -3,8 +3,9 @@
 
 use glam::{DVec3, Vec3};
 
+use super::form::{Forms, Lanes, dot, plus, transposed};
 use super::{
-    BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
@@ -44,8 +45,6 @@ pub struct Accumulated {
 }
 
 impl<S: EdgeStore> Cost<S> for Accumulated {
-    const MAY_FALL: bool = false;
-
     type Queue = Buckets;
     type State = Quadric;
 
@@ -125,16 +124,27 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     }
 
     #[inline]
-    fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
-        let ends = surface.mesh.edge_vertices(e);
-        let [v, w] = ends;
-        let along = surface.geometry.between(v, w);
-        let [at_v, at_w] = ends.map(|v| &self.quadrics[v.index()]);
-        let [a_v, a_w] = [at_v, at_w].map(|q| Symmetric::from_single(q.a));
-        let mut form = Form::of_ends(&a_v, &a_w, along);
-        form.b += at_v.b() + at_w.b();
-        form.at_tail += 2.0 * at_w.b().dot(along) + f64::from(at_v.c) + f64::from(at_w.c);
-        form.place(surface, ends, held, self.placement, |_, x, _| x)
+    fn evaluate(
+        &self,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+        held: &[[bool; 2]; LANES],
+    ) -> [Option<Evaluation>; LANES] {
+        let ends = edges.map(|e| surface.mesh.edge_vertices(e));
+        let along = ends.map(|[v, w]| surface.geometry.between(v, w).to_array());
+        let at = |end: usize| ends.map(|ends| &self.quadrics[ends[end].index()]);
+        let (at_v, at_w) = (at(0), at(1));
+        let a_v = transposed(at_v.map(|q| q.a.map(f64::from)));
+        let a_w = transposed(at_w.map(|q| q.a.map(f64::from)));
+        let b_v = transposed(at_v.map(|q| q.b.map(f64::from)));
+        let b_w = transposed(at_w.map(|q| q.b.map(f64::from)));
+        let c = |at: [&Quadric; LANES]| Lanes::from(at.map(|q| f64::from(q.c)));
+        let mut forms = Forms::of_ends(&a_v, &a_w, transposed(along));
+        forms.b = plus(&forms.b, &plus(&b_v, &b_w));
+        let b_along = dot(&b_w, &forms.along);
+        forms.at_tail += b_along + b_along + c(at_v) + c(at_w);
+        let least = forms.least_near_middle();
+        forms.place(surface, &ends, held, self.placement, least)
     }
 
     fn after_collapse(

@@ -7,13 +7,14 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::form::{Factors, Forms, Lanes, dot, minus, plus, scaled, select, transposed};
 use super::{
-    BOUNDARY_WEIGHT, Cost, Evaluation, Form, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
 use crate::decimate::surface::{Merged, Surface};
-use crate::decimate::symmetric::{Factor, Symmetric};
+use crate::decimate::symmetric::Symmetric;
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
 /// The weight of a fold. Without it a thin double sheet is free to eat: one mesh 1.68 → 0.91 of the
@@ -77,6 +78,9 @@ const CHANGE: f32 = 0.35;
 /// With fewer faces than this all edges are evaluated at once, unless they are part of a larger
 /// mesh: there it costs nothing, and a few collapses decide how the result looks.
 const EXACT_BELOW: usize = 8000;
+
+/// The ridge against singular tensors, relative to the trace. Larger ones cost rms on CAD parts.
+const RIDGE: f64 = 1e-8;
 
 /// The memoryless, volume-constrained cost.
 pub struct Memoryless {
@@ -179,8 +183,6 @@ fn add_fold(quadratic: &mut Symmetric, along: DVec3, a: Side, b: Side, is_crease
 }
 
 impl<S: EdgeStore> Cost<S> for Memoryless {
-    const MAY_FALL: bool = true;
-
     type Queue = Buckets;
     type State = ();
 
@@ -215,33 +217,46 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     fn join((): &mut (), (): &()) {}
 
     #[inline]
-    fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
-        let ends = surface.mesh.edge_vertices(e);
-        let [at_v, at_w] = ends.map(|v| &self.tensors[v.index()]);
-        let [quadratic_v, quadratic_w] = [at_v, at_w].map(|t| Symmetric::from_single(t.quadratic));
-        let along = surface.geometry.between(ends[0], ends[1]);
-        let form = Form::of_ends(&quadratic_v, &quadratic_w, along);
-        let heavy = ends.map(|v| self.lag[v.index()].every >= HEAVY);
-        let held = if held == [false; 2] && heavy != [true; 2] {
-            heavy
-        } else {
-            held
-        };
-        let keep_volume = |factor: &Factor, x: DVec3, trace: f64| {
-            let g = self.area_around(surface, e);
-            // The trace is weighted, the normals are not.
-            let [weight_v, weight_w] = ends.map(|v| surface.weight(v));
-            let trace = trace / weight_v.max(weight_w);
-            if g.length_squared() > CONSTRAINED * trace * trace {
-                // The volume that a point x from the tail would add is (g·x − k)/6.
-                let k = (g - at_v.area() + at_w.area()).dot(along) * 0.5;
-                let direction = factor.solve(g);
-                x + direction * ((k - g.dot(x)) / g.dot(direction))
-            } else {
-                x
+    fn evaluate(
+        &self,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+        held: &[[bool; 2]; LANES],
+    ) -> [Option<Evaluation>; LANES] {
+        let ends = edges.map(|e| surface.mesh.edge_vertices(e));
+        let along = ends.map(|[v, w]| surface.geometry.between(v, w).to_array());
+        let at = |end: usize| ends.map(|ends| &self.tensors[ends[end].index()]);
+        let (at_v, at_w) = (at(0), at(1));
+        let quadratic_v = transposed(at_v.map(|t| t.quadratic.map(f64::from)));
+        let quadratic_w = transposed(at_w.map(|t| t.quadratic.map(f64::from)));
+        let forms = Forms::of_ends(&quadratic_v, &quadratic_w, transposed(along));
+        let mut held_now = *held;
+        for (held, ends) in held_now.iter_mut().zip(ends) {
+            let heavy = ends.map(|v| self.lag[v.index()].every >= HEAVY);
+            if *held == [false; 2] && heavy != [true; 2] {
+                *held = heavy;
             }
-        };
-        form.place(surface, ends, held, self.placement, keep_volume)
+        }
+
+        let trace = forms.trace();
+        let factors = Factors::of(&forms.m, Lanes::splat(RIDGE) * trace);
+        let x = factors.solve(&forms.b);
+        // The volume that a point x from the tail would add is (g·x − k)/6.
+        let area_v = transposed(at_v.map(|t| t.area.map(f64::from)));
+        let area_w = transposed(at_w.map(|t| t.area.map(f64::from)));
+        let twice = transposed(edges.map(|e| self.area_beside(surface, e).to_array()));
+        let g = minus(&plus(&area_v, &area_w), &twice);
+        let k = dot(&minus(&plus(&g, &area_w), &area_v), &forms.along) * Lanes::splat(0.5);
+        let direction = factors.solve(&g);
+        let step = (k - dot(&g, &x)) / dot(&g, &direction);
+        // The trace is weighted, the normals are not.
+        let weight = Lanes::from(ends.map(|[v, w]| surface.weight(v).max(surface.weight(w))));
+        let trace = trace / weight;
+        let is_constrained = dot(&g, &g).simd_gt(Lanes::splat(CONSTRAINED) * trace * trace);
+        let constrained = plus(&x, &scaled(&direction, step));
+        let least = select(is_constrained, &constrained, &x);
+        let least = (least, factors.is_positive());
+        forms.place(surface, &ends, &held_now, self.placement, least)
     }
 
     fn after_collapse(
@@ -309,16 +324,18 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
 }
 
 impl Memoryless {
-    /// The sum of the normals around both ends, the faces at `e` counted once; nothing at a
-    /// non-manifold edge, which encloses no one volume.
-    fn area_around<S: EdgeStore>(&self, surface: &Surface<S>, e: EdgeId) -> DVec3 {
+    /// The sum of the normals of the faces at `e`; at a non-manifold edge, which encloses no one
+    /// volume, of all faces at both ends.
+    #[inline]
+    fn area_beside<S: EdgeStore>(&self, surface: &Surface<S>, e: EdgeId) -> DVec3 {
         let (mesh, geometry) = (&surface.mesh, &surface.geometry);
-        let [v, w] = mesh.edge_vertices(e);
-        let around = self.tensors[v.index()].area() + self.tensors[w.index()].area();
         match mesh.opposite(e) {
-            Opposite::Edge(o) => around - geometry.normal(mesh, e) - geometry.normal(mesh, o),
-            Opposite::Boundary => around - geometry.normal(mesh, e),
-            Opposite::NonManifold(_) => DVec3::ZERO,
+            Opposite::Edge(o) => geometry.normal(mesh, e) + geometry.normal(mesh, o),
+            Opposite::Boundary => geometry.normal(mesh, e),
+            Opposite::NonManifold(_) => {
+                let [v, w] = mesh.edge_vertices(e);
+                self.tensors[v.index()].area() + self.tensors[w.index()].area()
+            }
         }
     }
 }
