@@ -17,18 +17,20 @@ pub struct Medium(Vec<Edge>);
 impl EdgeStore for Medium {
     const TIER: Tier = Tier::Medium;
 
-    fn from_triangles(triangles: &[[u32; 3]]) -> Self {
-        let mut edges = Vec::with_capacity(3 * triangles.len());
-        for (i, t) in triangles.iter().enumerate() {
-            for k in 0..3 {
-                edges.push(Edge {
+    fn from_triangles(triangles: &[[u32; 3]], opposites: &[OppositeWord]) -> Self {
+        let (opposites, _) = opposites.as_chunks::<3>();
+        let faces = triangles
+            .iter()
+            .zip(opposites)
+            .enumerate()
+            .map(|(i, (t, opposites))| {
+                [0, 1, 2].map(|k| Edge {
                     head: VertexId::new(t[(k + 1) % 3] as usize),
                     prev: EdgeId::new(3 * i + (k + 2) % 3),
-                    opposite: OppositeWord::BOUNDARY,
-                });
-            }
-        }
-        Self(edges)
+                    opposite: opposites[k],
+                })
+            });
+        Self(faces.collect::<Vec<_>>().into_flattened())
     }
 
     #[inline(always)]

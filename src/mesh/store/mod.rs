@@ -66,8 +66,8 @@ pub trait EdgeStore: Clone + Send + Sync + Sized {
     /// The tier that this store is.
     const TIER: Tier;
 
-    /// The store of these triangles, every edge a boundary.
-    fn from_triangles(triangles: &[[u32; 3]]) -> Self;
+    /// The store of these triangles; what lies across each edge.
+    fn from_triangles(triangles: &[[u32; 3]], opposites: &[OppositeWord]) -> Self;
 
     /// The directed edges, dead ones included.
     fn slots(&self) -> usize;

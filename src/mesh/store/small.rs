@@ -15,18 +15,15 @@ pub struct Small(Vec<Edge>);
 impl EdgeStore for Small {
     const TIER: Tier = Tier::Small;
 
-    fn from_triangles(triangles: &[[u32; 3]]) -> Self {
-        let mut edges = Vec::with_capacity(3 * triangles.len());
-        for t in triangles {
-            for k in 0..3 {
-                let head = VertexId::new(t[(k + 1) % 3] as usize);
-                edges.push(Edge {
-                    head,
-                    opposite: OppositeWord::BOUNDARY,
-                });
-            }
-        }
-        Self(edges)
+    fn from_triangles(triangles: &[[u32; 3]], opposites: &[OppositeWord]) -> Self {
+        let (opposites, _) = opposites.as_chunks::<3>();
+        let faces = triangles.iter().zip(opposites).map(|(t, opposites)| {
+            [0, 1, 2].map(|k| Edge {
+                head: VertexId::new(t[(k + 1) % 3] as usize),
+                opposite: opposites[k],
+            })
+        });
+        Self(faces.collect::<Vec<_>>().into_flattened())
     }
 
     #[inline(always)]
