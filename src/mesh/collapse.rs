@@ -45,7 +45,14 @@ impl<S: EdgeStore> Mesh<S> {
     /// - no edge lies across from both ends (a tetrahedron, a pillow).
     ///
     /// Costs one walk around each end.
+    #[inline]
     pub fn link_condition(&self, e: EdgeId) -> bool {
+        self.link_condition_of_disks(e)
+            .unwrap_or_else(|| self.general_link_condition(e))
+    }
+
+    /// [`link_condition`](Self::link_condition), of any edge.
+    pub(super) fn general_link_condition(&self, e: EdgeId) -> bool {
         let [u, v] = self.edge_vertices(e);
         let star = self.edge_star(e);
         let is_singular = |e| self.mate(e).is_none();
@@ -184,6 +191,14 @@ impl<S: EdgeStore> Mesh<S> {
             self.link_condition(e),
             "collapse of {e:?} would change the topology"
         );
+        match self.collapse_disks(e) {
+            Some(collapse) => collapse,
+            None => self.general_collapse(e),
+        }
+    }
+
+    /// [`collapse`](Self::collapse), of any edge.
+    pub(super) fn general_collapse(&mut self, e: EdgeId) -> Collapse {
         let [removed, kept] = self.edge_vertices(e);
         let star = self.edge_star(e);
         let fans_are_simple = star.len() <= 2
@@ -260,7 +275,7 @@ impl<S: EdgeStore> Mesh<S> {
 
     /// Joins the two edges beside `d` in its dying face into one, and returns a directed edge of
     /// it that lives on.
-    fn close_face(&mut self, d: EdgeId) -> EdgeId {
+    pub(super) fn close_face(&mut self, d: EdgeId) -> EdgeId {
         let (behind, before) = (self.next(d), self.prev(d));
         let (across_behind, across_before) = (self.opposite(behind), self.opposite(before));
         let (dying, survivor, link) = match (across_behind, across_before) {

@@ -17,6 +17,7 @@ mod collapse;
 mod compact;
 mod components;
 mod contract;
+mod disk;
 mod fill;
 mod flip;
 mod ids;

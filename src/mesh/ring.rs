@@ -52,6 +52,60 @@ impl Iterator for Fans<'_> {
     }
 }
 
+/// The outgoing edges of a vertex, fan by fan.
+#[derive(Clone, Debug)]
+struct OutgoingEdges<'a, S> {
+    fan: Fan<'a, S>,
+    others: slice::Iter<'a, EdgeId>,
+}
+
+impl<S: EdgeStore> Iterator for OutgoingEdges<'_, S> {
+    type Item = EdgeId;
+
+    #[inline]
+    fn next(&mut self) -> Option<EdgeId> {
+        loop {
+            if let Some(e) = self.fan.next() {
+                return Some(e);
+            }
+            self.fan = self.fan.mesh.fan(*self.others.next()?);
+        }
+    }
+}
+
+/// The vertices next to a vertex, fan by fan.
+#[derive(Clone, Debug)]
+struct Neighbours<'a, S> {
+    fan: Fan<'a, S>,
+    /// The edge that comes in at the end of an open fan.
+    end: Option<EdgeId>,
+    others: slice::Iter<'a, EdgeId>,
+}
+
+impl<S: EdgeStore> Iterator for Neighbours<'_, S> {
+    type Item = VertexId;
+
+    #[inline]
+    fn next(&mut self) -> Option<VertexId> {
+        let mesh = self.fan.mesh;
+        loop {
+            if let Some(e) = self.fan.at {
+                let before = mesh.prev(e);
+                let mate = mesh.mate(before);
+                if mate.is_none() {
+                    self.end = Some(before);
+                }
+                self.fan.at = mate.filter(|&o| o != self.fan.start);
+                return Some(mesh.head(e));
+            }
+            if let Some(end) = self.end.take() {
+                return Some(mesh.tail(end));
+            }
+            self.fan = mesh.fan(*self.others.next()?);
+        }
+    }
+}
+
 /// A run of boundary edges, each beginning where the one before ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoundaryCurve {
@@ -95,7 +149,7 @@ impl<S: EdgeStore> Mesh<S> {
     /// The outgoing edges of `v`, fan by fan: one per face around `v`.
     #[inline]
     pub fn outgoing_edges(&self, v: VertexId) -> impl Iterator<Item = EdgeId> + '_ {
-        self.fans(v).flat_map(|start| self.fan(start))
+        self.walk(v)
     }
 
     /// All faces that share a vertex (VF), fan by fan.
@@ -148,18 +202,23 @@ impl<S: EdgeStore> Mesh<S> {
     /// there.
     #[inline]
     pub fn neighbours(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
-        self.fans(v).flat_map(move |start| {
-            let is_open = self.mate(start).is_none();
-            let mut fan = self.fan(start);
-            let mut last = Some(start).filter(|_| is_open);
-            std::iter::from_fn(move || match fan.next() {
-                Some(e) => {
-                    last = last.map(|_| e);
-                    Some(self.head(e))
-                }
-                None => last.take().map(|e| self.apex(e)),
-            })
-        })
+        let OutgoingEdges { fan, others } = self.walk(v);
+        let end = None;
+        Neighbours { fan, end, others }
+    }
+
+    /// The walk around `v`, before its first step.
+    #[inline]
+    fn walk(&self, v: VertexId) -> OutgoingEdges<'_, S> {
+        let (at, others) = match self.outgoing(v) {
+            Outgoing::Fan(start) => (Some(start), [].iter()),
+            Outgoing::Fans(row) => (None, self.fan_rows.row(row).iter()),
+            Outgoing::None => (None, [].iter()),
+        };
+        let start = at.unwrap_or(EdgeId::new(0));
+        let mesh = self;
+        let fan = Fan { mesh, start, at };
+        OutgoingEdges { fan, others }
     }
 
     /// The first edge of the fan that the outgoing edge `e` lies in; of a closed fan `e` itself.

@@ -320,6 +320,54 @@ fn collapses_keep_tables_and_topology<S: EdgeStore>() {
     );
 }
 
+/// Where the path for disks has an answer, it is the general one's; where it collapses, every word is
+/// what the general path writes.
+fn disks_are_treated_as_any_edge<S: EdgeStore>() {
+    let (mut answers, mut collapses) = (0, 0);
+    let named = named_shapes().into_iter().map(|(_, (p, t))| (p.len(), t));
+    let complexes = (1..100).map(random_complex);
+    let surfaces = (1..100).map(random_surface);
+    for (i, (vertices, triangles)) in named.chain(complexes).chain(surfaces).enumerate() {
+        let mut mesh = Mesh::<S>::from_triangles(vertices, &triangles);
+        let words = |mesh: &Mesh<S>| {
+            let edges = mesh.faces().flat_map(FaceId::edges);
+            let edges = edges.map(|e| (mesh.edge_vertices(e), mesh.opposite(e)));
+            let outgoing = (0..vertices).map(|v| mesh.outgoing(VertexId::new(v)));
+            let counts = [mesh.live_faces, mesh.live_vertices];
+            (
+                edges.collect::<Vec<_>>(),
+                outgoing.collect::<Vec<_>>(),
+                counts,
+            )
+        };
+        let mut random = Random(i as u64 + 1);
+        for _ in 0..60 {
+            let edges = live_edges(&mesh);
+            let star = mesh.edge_star(edges[random.below(edges.len())]);
+            let e = star[random.below(star.len())];
+            let answer = mesh.general_link_condition(e);
+            if let Some(of_disks) = mesh.link_condition_of_disks(e) {
+                assert_eq!(of_disks, answer, "case {i}: {e:?}");
+                answers += 1;
+            }
+            if !answer {
+                continue;
+            }
+            let mut general = mesh.clone();
+            let expected = general.general_collapse(e);
+            if let Some(record) = mesh.collapse_disks(e) {
+                assert_eq!(record, expected, "case {i}: {e:?}");
+                collapses += 1;
+            } else {
+                assert_eq!(mesh.general_collapse(e), expected);
+            }
+            assert_eq!(words(&mesh), words(&general), "case {i}: {e:?}");
+        }
+    }
+    assert!(answers > 3000, "{answers}");
+    assert!(collapses > 1500, "{collapses}");
+}
+
 /// Collapse by collapse, the link condition says yes exactly where the triangles allow it: every
 /// topological count stays, and no two faces become the same.
 fn the_link_condition_refuses_only_what_changes_something<S: EdgeStore>() {
@@ -761,6 +809,7 @@ for_each_tier!(
     pinching_a_torus_leaves_a_sphere,
     a_neck_is_no_handle,
     a_component_is_removed_alone,
+    disks_are_treated_as_any_edge,
     contractions_make_nothing_worse,
     opposites_equal_brute_force,
     queries_equal_brute_force,
