@@ -74,6 +74,8 @@ impl<S: EdgeStore> Mesh<S> {
     /// The live triangles in the order of their slots, three vertex slots each.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let slots = |f| self.face_vertices(f).map(|v| v.index() as u32);
-        self.faces().map(slots).collect()
+        let mut triangles = Vec::with_capacity(self.live_faces);
+        triangles.extend(self.faces().map(slots));
+        triangles
     }
 }

@@ -7,12 +7,9 @@ use super::collapse::Collapse;
 use super::link::Outgoing;
 use super::{EdgeId, EdgeStore, Mesh, OppositeWord, VertexId};
 
-/// The neighbours of the tail that are compared at once, beside the head and the apexes. Meshes
-/// in decimation have hardly a vertex of valence above 15.
-const FEW: usize = 12;
-
-/// The neighbours of the head that are compared; more ask for a way that does not look at all.
-const MANY: usize = 48;
+/// The most neighbours of an end that are compared; two more are not. Hardly a vertex of a mesh in
+/// decimation has more, and 12 would take the same time.
+const FEW: usize = 16;
 
 impl<S: EdgeStore> Mesh<S> {
     /// The [link condition](Self::link_condition) of an edge between two disks of few neighbours;
@@ -20,8 +17,8 @@ impl<S: EdgeStore> Mesh<S> {
     ///
     /// ```text
     ///         y
-    ///      ↗  o  ↘           `others` of u: from behind u→x to before u→y,
-    ///     u ──────→ v                of v: from behind v→y to before v→x
+    ///      ↗  o  ↘           around u: from u→x to before u→y
+    ///     u ──────→ v        around v: from v→y to before v→x
     ///      ↘  e  ↗
     ///         x
     /// ```
@@ -32,34 +29,30 @@ impl<S: EdgeStore> Mesh<S> {
         if !self.has_one_fan(u) || !self.has_one_fan(v) {
             return None;
         }
-        // The places that are left name v, which is no neighbour of itself.
-        let mut around_u = [v; FEW];
-        let mut others_of_u = 0;
-        let (to_x, to_y) = (self.step(e)?, self.next(o));
-        let mut at = to_x;
-        while at != to_y {
-            at = self.step(at)?;
-            if at != to_y {
-                *around_u.get_mut(others_of_u)? = self.head(at);
-                others_of_u += 1;
-            }
+        let (mut at_u, mut at_v) = (self.step(e)?, self.step(o)?);
+        let (end_u, end_v) = (self.next(o), self.next(e));
+        let are_on_each_other = at_u == end_u;
+        // Places left over name the vertex itself, which is on neither way.
+        let (mut around_u, mut around_v) = ([u; FEW], [v; FEW]);
+        let (mut of_u, mut of_v) = (around_u.iter_mut(), around_v.iter_mut());
+        // Both ways at once: each step waits for the one before it, but not for the other way's.
+        while at_u != end_u && at_v != end_v {
+            (*of_u.next()?, *of_v.next()?) = (self.head(at_u), self.head(at_v));
+            (at_u, at_v) = (self.step(at_u)?, self.step(at_v)?);
         }
-        let mut others_of_v = 0;
-        let mut is_common = false;
-        let last = self.next(e);
-        let mut at = self.step(o)?;
-        while at != last {
-            at = self.step(at)?;
-            if at != last {
-                let z = self.head(at);
-                is_common |= around_u.iter().fold(false, |any, &x| any | (x == z));
-                others_of_v += 1;
-                if others_of_v == MANY {
-                    return None;
-                }
-            }
+        while at_u != end_u {
+            *of_u.next()? = self.head(at_u);
+            at_u = self.step(at_u)?;
         }
-        let is_tetrahedron = others_of_u + others_of_v == 0 && to_x != to_y;
+        while at_v != end_v {
+            *of_v.next()? = self.head(at_v);
+            at_v = self.step(at_v)?;
+        }
+        let (left_u, left_v) = (of_u.len(), of_v.len());
+        let is_around_u = |z| around_u.iter().fold(false, |any, &x| any | (x == z));
+        let mut around_v = around_v[..FEW - left_v].iter();
+        let is_common = around_v.fold(false, |any, &z| any | is_around_u(z));
+        let is_tetrahedron = left_u.min(left_v) == FEW - 1 && !are_on_each_other;
         Some(!is_common && !is_tetrahedron)
     }
 
