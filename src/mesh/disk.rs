@@ -50,7 +50,7 @@ impl<S: EdgeStore> Mesh<S> {
         }
         let (left_u, left_v) = (of_u.len(), of_v.len());
         let is_around_u = |z| around_u.iter().fold(false, |any, &x| any | (x == z));
-        let mut around_v = around_v[..FEW - left_v].iter();
+        let around_v = around_v[..FEW - left_v].iter();
         let is_common = around_v.fold(false, |any, &z| any | is_around_u(z));
         let is_tetrahedron = left_u.min(left_v) == FEW - 1 && !are_on_each_other;
         Some(!is_common && !is_tetrahedron)

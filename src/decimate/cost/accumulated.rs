@@ -3,9 +3,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::form::{Forms, Lanes, dot, plus, transposed};
+use super::form::{Form, Lanes, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
@@ -15,27 +15,35 @@ use crate::mesh::{Collapse, EdgeId, EdgeStore, VertexId};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
 /// y from the vertex, where single precision has all its digits. 40 bytes.
+///
+/// The six numbers of A, three of b, and c.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Quadric {
-    a: [f32; 6],
-    b: [f32; 3],
-    c: f32,
-}
+pub struct Quadric([f32; 10]);
 
 impl Quadric {
-    fn b(&self) -> DVec3 {
-        Vec3::from(self.b).as_dvec3()
+    fn new(a: Symmetric, b: DVec3, c: f64) -> Self {
+        let [xx, xy, xz, yy, yz, zz] = a.0;
+        Self([xx, xy, xz, yy, yz, zz, b.x, b.y, b.z, c].map(|x| x as f32))
     }
 
     /// A, b and c as seen from a point at `d` from the vertex.
     #[inline(always)]
     fn seen_from(&self, d: DVec3) -> (Symmetric, DVec3, f64) {
-        let a = Symmetric::from_single(self.a);
+        let [xx, xy, xz, yy, yz, zz, x, y, z, c] = self.0.map(f64::from);
+        let (a, b) = (Symmetric([xx, xy, xz, yy, yz, zz]), DVec3::new(x, y, z));
         let along = a.times(d);
-        let b = self.b() - along;
-        let c = f64::from(self.c) - 2.0 * self.b().dot(d) + d.dot(along);
-        (a, b, c)
+        (a, b - along, c - 2.0 * b.dot(d) + d.dot(along))
     }
+}
+
+/// By how much an end may cost more than the optimum and still be taken, relative to the tensor's
+/// trace times the squared edge length: single precision's noise.
+const AS_GOOD: f64 = 1e-6;
+
+/// The numbers of all lanes, from each lane's.
+#[inline(always)]
+fn transposed<const N: usize>(lanes: [[f32; N]; LANES]) -> [Lanes; N] {
+    std::array::from_fn(|i| Lanes::from([lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]]))
 }
 
 /// The accumulated cost.
@@ -81,10 +89,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         }
         let quadric = |(v, sum): (usize, Symmetric)| {
             let weight = surface.weight(VertexId::new(v));
-            Quadric {
-                a: sum.0.map(|x| (x * weight) as f32),
-                ..Quadric::default()
-            }
+            Quadric::new(Symmetric(sum.0.map(|x| x * weight)), DVec3::ZERO, 0.0)
         };
         Self {
             quadrics: sums.into_iter().enumerate().map(quadric).collect(),
@@ -111,16 +116,11 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         };
         let mut a = Symmetric::default();
         a.add_line(along, LINE_WEIGHT * weight);
-        Quadric {
-            a: a.0.map(|x| x as f32),
-            ..Quadric::default()
-        }
+        Quadric::new(a, DVec3::ZERO, 0.0)
     }
 
     fn join(state: &mut Quadric, part: &Quadric) {
-        state.a = std::array::from_fn(|i| state.a[i] + part.a[i]);
-        state.b = std::array::from_fn(|i| state.b[i] + part.b[i]);
-        state.c += part.c;
+        state.0 = std::array::from_fn(|i| state.0[i] + part.0[i]);
     }
 
     #[inline]
@@ -131,20 +131,36 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         held: &[[bool; 2]; LANES],
     ) -> [Option<Evaluation>; LANES] {
         let ends = edges.map(|e| surface.mesh.edge_vertices(e));
-        let along = ends.map(|[v, w]| surface.geometry.between(v, w).to_array());
-        let at = |end: usize| ends.map(|ends| &self.quadrics[ends[end].index()]);
-        let (at_v, at_w) = (at(0), at(1));
-        let a_v = transposed(at_v.map(|q| q.a.map(f64::from)));
-        let a_w = transposed(at_w.map(|q| q.a.map(f64::from)));
-        let b_v = transposed(at_v.map(|q| q.b.map(f64::from)));
-        let b_w = transposed(at_w.map(|q| q.b.map(f64::from)));
-        let c = |at: [&Quadric; LANES]| Lanes::from(at.map(|q| f64::from(q.c)));
-        let mut forms = Forms::of_ends(&a_v, &a_w, transposed(along));
-        forms.b = plus(&forms.b, &plus(&b_v, &b_w));
-        let b_along = dot(&b_w, &forms.along);
-        forms.at_tail += b_along + b_along + c(at_v) + c(at_w);
-        let least = forms.least_near_middle();
-        forms.place(surface, &ends, held, self.placement, least)
+        let at = |end: usize| ends.map(|ends| surface.geometry.position(ends[end]).to_array());
+        let (from, to): ([Lanes; 3], [Lanes; 3]) = (transposed(at(0)), transposed(at(1)));
+        let scale = Lanes::splat(surface.geometry.scale() as f32);
+        let along = std::array::from_fn(|i| (to[i] - from[i]) * scale);
+        let numbers = |end: usize| transposed(ends.map(|ends| self.quadrics[ends[end].index()].0));
+        let (at_v, at_w): ([Lanes; 10], [Lanes; 10]) = (numbers(0), numbers(1));
+        let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_v] = at_v;
+        let (a_v, b_v) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
+        let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_w] = at_w;
+        let (a_w, b_w) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
+        let mut form = Form::of_ends(&a_v, &a_w, along);
+        form.b = plus(&form.b, &plus(&b_v, &b_w));
+        let b_along = dot(&b_w, &form.along);
+        form.at_tail = form.at_tail + (b_along + b_along) + (c_v + c_w);
+        let least = form.compared(&form.least_near_middle(), AS_GOOD);
+        let [x, y, z] = least.x.map(Lanes::to_array);
+        let [at_tail, at_head, at_x, length_squared] =
+            [least.at_tail, least.at_head, least.at_x, least.length_squared].map(Lanes::to_array);
+        let [x_is_better, head_is_better] =
+            [least.x_is_better, least.head_is_better].map(Lanes::to_bitmask);
+        std::array::from_fn(|i| {
+            let choice = Choice {
+                x_is_better: x_is_better >> i & 1 != 0,
+                head_is_better: head_is_better >> i & 1 != 0,
+                energies: [at_tail[i].into(), at_head[i].into(), at_x[i].into()],
+                x: Vec3::new(x[i], y[i], z[i]).as_dvec3(),
+                length_squared: length_squared[i].into(),
+            };
+            choice.evaluation(surface, ends[i], held[i], self.placement)
+        })
     }
 
     fn after_collapse(
@@ -163,11 +179,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
             })
             .reduce(|(a, b, c), (a2, b2, c2)| (a.plus(a2), b + b2, c + c2));
         let (a, b, c) = sum.expect("two ends");
-        self.quadrics[kept.index()] = Quadric {
-            a: a.0.map(|x| x as f32),
-            b: b.as_vec3().to_array(),
-            c: c.max(0.0) as f32,
-        };
+        self.quadrics[kept.index()] = Quadric::new(a, b, c.max(0.0));
         changed.clear();
         changed.push(kept);
     }

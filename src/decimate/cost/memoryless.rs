@@ -7,14 +7,14 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::form::{Factors, Forms, Lanes, dot, minus, plus, scaled, select, transposed};
+use super::form::Form;
 use super::{
-    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
 use crate::decimate::surface::{Merged, Surface};
-use crate::decimate::symmetric::Symmetric;
+use crate::decimate::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
 /// The weight of a fold. Without it a thin double sheet is free to eat: one mesh 1.68 → 0.91 of the
@@ -81,6 +81,10 @@ const EXACT_BELOW: usize = 8000;
 
 /// The ridge against singular tensors, relative to the trace. Larger ones cost rms on CAD parts.
 const RIDGE: f64 = 1e-8;
+
+/// By how much an end may cost more than the optimum and still be taken, relative to the tensor's
+/// trace times the squared edge length: single precision's noise in the tensors.
+const AS_GOOD: f64 = 1e-7;
 
 /// The memoryless, volume-constrained cost.
 pub struct Memoryless {
@@ -223,40 +227,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         edges: &[EdgeId; LANES],
         held: &[[bool; 2]; LANES],
     ) -> [Option<Evaluation>; LANES] {
-        let ends = edges.map(|e| surface.mesh.edge_vertices(e));
-        let along = ends.map(|[v, w]| surface.geometry.between(v, w).to_array());
-        let at = |end: usize| ends.map(|ends| &self.tensors[ends[end].index()]);
-        let (at_v, at_w) = (at(0), at(1));
-        let quadratic_v = transposed(at_v.map(|t| t.quadratic.map(f64::from)));
-        let quadratic_w = transposed(at_w.map(|t| t.quadratic.map(f64::from)));
-        let forms = Forms::of_ends(&quadratic_v, &quadratic_w, transposed(along));
-        let mut held_now = *held;
-        for (held, ends) in held_now.iter_mut().zip(ends) {
-            let heavy = ends.map(|v| self.lag[v.index()].every >= HEAVY);
-            if *held == [false; 2] && heavy != [true; 2] {
-                *held = heavy;
-            }
-        }
-
-        let trace = forms.trace();
-        let factors = Factors::of(&forms.m, Lanes::splat(RIDGE) * trace);
-        let x = factors.solve(&forms.b);
-        // The volume that a point x from the tail would add is (g·x − k)/6.
-        let area_v = transposed(at_v.map(|t| t.area.map(f64::from)));
-        let area_w = transposed(at_w.map(|t| t.area.map(f64::from)));
-        let twice = transposed(edges.map(|e| self.area_beside(surface, e).to_array()));
-        let g = minus(&plus(&area_v, &area_w), &twice);
-        let k = dot(&minus(&plus(&g, &area_w), &area_v), &forms.along) * Lanes::splat(0.5);
-        let direction = factors.solve(&g);
-        let step = (k - dot(&g, &x)) / dot(&g, &direction);
-        // The trace is weighted, the normals are not.
-        let weight = Lanes::from(ends.map(|[v, w]| surface.weight(v).max(surface.weight(w))));
-        let trace = trace / weight;
-        let is_constrained = dot(&g, &g).simd_gt(Lanes::splat(CONSTRAINED) * trace * trace);
-        let constrained = plus(&x, &scaled(&direction, step));
-        let least = select(is_constrained, &constrained, &x);
-        let least = (least, factors.is_positive());
-        forms.place(surface, &ends, &held_now, self.placement, least)
+        std::array::from_fn(|i| self.evaluate_one(surface, edges[i], held[i]))
     }
 
     fn after_collapse(
@@ -324,18 +295,62 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
 }
 
 impl Memoryless {
-    /// The sum of the normals of the faces at `e`; at a non-manifold edge, which encloses no one
-    /// volume, of all faces at both ends.
     #[inline]
-    fn area_beside<S: EdgeStore>(&self, surface: &Surface<S>, e: EdgeId) -> DVec3 {
-        let (mesh, geometry) = (&surface.mesh, &surface.geometry);
-        match mesh.opposite(e) {
-            Opposite::Edge(o) => geometry.normal(mesh, e) + geometry.normal(mesh, o),
-            Opposite::Boundary => geometry.normal(mesh, e),
-            Opposite::NonManifold(_) => {
-                let [v, w] = mesh.edge_vertices(e);
-                self.tensors[v.index()].area() + self.tensors[w.index()].area()
+    fn evaluate_one<S: EdgeStore>(
+        &self,
+        surface: &Surface<S>,
+        e: EdgeId,
+        held: [bool; 2],
+    ) -> Option<Evaluation> {
+        let ends = surface.mesh.edge_vertices(e);
+        let [at_v, at_w] = ends.map(|v| &self.tensors[v.index()]);
+        let [quadratic_v, quadratic_w] = [at_v, at_w].map(|t| t.quadratic.map(f64::from));
+        let along = surface.geometry.between(ends[0], ends[1]);
+        let form = Form::of_ends(&quadratic_v, &quadratic_w, along.to_array());
+        let heavy = ends.map(|v| self.lag[v.index()].every >= HEAVY);
+        let held = if held == [false; 2] && heavy != [true; 2] {
+            heavy
+        } else {
+            held
+        };
+        let trace = form.trace();
+        let x = Factor::of(&Symmetric(form.m), RIDGE * trace).map(|factor| {
+            let x = factor.solve(DVec3::from(form.b));
+            let g = self.area_around(surface, e);
+            // The trace is weighted, the normals are not.
+            let [weight_v, weight_w] = ends.map(|v| surface.weight(v));
+            let trace = trace / weight_v.max(weight_w);
+            if g.length_squared() > CONSTRAINED * trace * trace {
+                // The volume that a point x from the tail would add is (g·x − k)/6.
+                let k = (g - at_v.area() + at_w.area()).dot(along) * 0.5;
+                let direction = factor.solve(g);
+                x + direction * ((k - g.dot(x)) / g.dot(direction))
+            } else {
+                x
             }
+        });
+        let least = form.compared(&x.unwrap_or(DVec3::NAN).to_array(), AS_GOOD);
+        let choice = Choice {
+            x_is_better: least.x_is_better,
+            head_is_better: least.head_is_better,
+            energies: [least.at_tail, least.at_head, least.at_x],
+            x: least.x.into(),
+            length_squared: least.length_squared,
+        };
+        choice.evaluation(surface, ends, held, self.placement)
+    }
+
+    /// The sum of the normals around both ends, the faces at `e` counted once; nothing at a
+    /// non-manifold edge, which encloses no one volume.
+    #[inline]
+    fn area_around<S: EdgeStore>(&self, surface: &Surface<S>, e: EdgeId) -> DVec3 {
+        let (mesh, geometry) = (&surface.mesh, &surface.geometry);
+        let [v, w] = mesh.edge_vertices(e);
+        let around = self.tensors[v.index()].area() + self.tensors[w.index()].area();
+        match mesh.opposite(e) {
+            Opposite::Edge(o) => around - geometry.normal(mesh, e) - geometry.normal(mesh, o),
+            Opposite::Boundary => around - geometry.normal(mesh, e),
+            Opposite::NonManifold(_) => DVec3::ZERO,
         }
     }
 }

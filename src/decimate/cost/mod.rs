@@ -12,7 +12,7 @@ pub use memoryless::Memoryless;
 
 use glam::{DVec3, Vec3};
 
-use super::options::{Boundary, Options};
+use super::options::{Boundary, Options, Placement};
 use super::queue::Queue;
 use super::surface::{Merged, Surface};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
@@ -51,7 +51,7 @@ pub trait Cost<S: EdgeStore>: Send + Sync {
     /// Adds to a state what other faces or lines say.
     fn join(state: &mut Self::State, part: &Self::State);
 
-    /// The collapses of edges, each with its tail or head held in place; nothing where both are held.
+    /// The collapses of edges, each with its tail or head held in place.
     fn evaluate(
         &self,
         surface: &Surface<S>,
@@ -100,12 +100,11 @@ pub(super) const BOUNDARY_WEIGHT: f64 = 8.0;
 /// Squared edge length enters with this weight, so that ties in flat regions go to short edges.
 const TIE_BREAK: f64 = 1e-12;
 
+/// Squared edge length enters with this weight, so that ties in flat regions go to short edges.
+const TIE_BREAK: f64 = 1e-12;
+
 /// How far the optimum may lie from the middle, in lengths of the edge.
 const REACH: f64 = 3.0;
-
-/// By how much an end may cost more than the optimum and still be taken, relative to the tensor's
-/// trace times the squared edge length: single precision's noise in the tensors.
-const AS_GOOD: f64 = 1e-7;
 
 /// The weight of a boundary edge's line, by what boundaries may do.
 fn boundary_weight(boundary: Boundary) -> f64 {
@@ -123,5 +122,47 @@ fn singular_weight<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId, boundary_weight: f64
         Opposite::Edge(_) => None,
         Opposite::Boundary => Some(boundary_weight),
         Opposite::NonManifold(_) => (mesh.canonical(e) == e).then_some(BOUNDARY_WEIGHT),
+    }
+}
+
+/// Which of the three places is taken.
+#[derive(Clone, Copy)]
+struct Choice {
+    x_is_better: bool,
+    head_is_better: bool,
+    /// The energies at the tail, at the head and at x.
+    energies: [f64; 3],
+    x: DVec3,
+    length_squared: f64,
+}
+
+impl Choice {
+    /// The cheapest of both ends and x, of those that may be.
+    #[inline(always)]
+    fn evaluation<S: EdgeStore>(
+        self,
+        surface: &Surface<S>,
+        [v, w]: [VertexId; 2],
+        held: [bool; 2],
+        placement: Placement,
+    ) -> Option<Evaluation> {
+        let [at_tail, at_head, at_x] = self.energies;
+        let takes_head = match held {
+            [true, true] => return None,
+            [true, false] => false,
+            [false, true] => true,
+            [false, false] => self.head_is_better,
+        };
+        let geometry = &surface.geometry;
+        let is_free = held == [false; 2] && placement == Placement::Optimal;
+        let (energy, position) = if is_free && self.x_is_better {
+            (at_x, geometry.point_near(v, self.x))
+        } else if takes_head {
+            (at_head, geometry.position(w))
+        } else {
+            (at_tail, geometry.position(v))
+        };
+        let cost = energy.max(0.0) + TIE_BREAK * self.length_squared;
+        (cost.is_finite() && position.is_finite()).then_some(Evaluation { cost, position })
     }
 }

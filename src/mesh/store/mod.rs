@@ -66,7 +66,7 @@ pub trait EdgeStore: Clone + Send + Sync + Sized {
     /// The tier that this store is.
     const TIER: Tier;
 
-    /// The store of these triangles; what lies across each edge.
+    /// The store of these triangles, with the word of what lies across each edge.
     fn from_triangles(triangles: &[[u32; 3]], opposites: &[OppositeWord]) -> Self;
 
     /// The directed edges, dead ones included.
