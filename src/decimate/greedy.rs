@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use smallvec::SmallVec;
 
 use super::cost::{Cost, Evaluation, LANES};
 use super::options::Topology;
@@ -62,24 +61,6 @@ enum Way {
     Contract(Contraction, Loss),
 }
 
-/// Edges that wait to be evaluated together.
-#[derive(Clone, Copy)]
-struct Batch {
-    edges: [EdgeId; LANES],
-    held: [[bool; 2]; LANES],
-    count: usize,
-}
-
-impl Default for Batch {
-    fn default() -> Self {
-        Self {
-            edges: [EdgeId::new(0); LANES],
-            held: [[false; 2]; LANES],
-            count: 0,
-        }
-    }
-}
-
 /// A part of the surface that hangs together with nothing else.
 struct Component {
     /// What it costs to remove it.
@@ -99,6 +80,8 @@ pub struct Greedy<S: EdgeStore, C: Cost<S>> {
     changed: Vec<VertexId>,
     /// The edges to evaluate after a collapse; kept for its memory.
     edges: Vec<EdgeId>,
+    /// And their candidates.
+    found: Vec<Candidate>,
     triangles: usize,
     stop: Stop,
     topology: Topology,
@@ -121,6 +104,7 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             changed_at: vec![0; surface.mesh.vertex_slots()],
             changed: Vec::new(),
             edges: Vec::new(),
+            found: Vec::new(),
             triangles: surface.triangles(),
             stop: Stop {
                 triangles: 0,
@@ -146,36 +130,24 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
     /// Queues every edge that `choose` takes; evaluated in parallel. Whether there is one.
     fn queue_all(&mut self, choose: impl Fn(&Self, &Candidate) -> bool + Sync) -> bool {
         let slots = self.surface.mesh.face_slots();
-        let candidates_of = |greedy: &Self, f: FaceId, batch: &mut Batch, to: &mut Vec<Candidate>| {
-            let mesh = &greedy.surface.mesh;
-            if mesh.is_live_face(f) {
-                for e in f.edges().into_iter().filter(|&e| mesh.canonical(e) == e) {
-                    greedy.evaluate_in(batch, Some(e), |c| to.extend(Some(c).filter(|c| choose(greedy, c))));
-                }
-            }
-        };
         let mut is_any = false;
         // In blocks, so that no second copy of all candidates is held.
         for first in (0..slots).step_by(BLOCK_FACES) {
             let block = first..slots.min(first + BLOCK_FACES);
+            let parts = block.len().div_ceil(PART_FACES);
             let greedy = &*self;
-            let parts: Vec<Vec<Candidate>> = block
-                .into_par_iter()
-                .with_min_len(PART_FACES)
-                .map(FaceId::new)
-                .fold(
-                    || (Batch::default(), Vec::new()),
-                    |(mut batch, mut part), f| {
-                        candidates_of(greedy, f, &mut batch, &mut part);
-                        (batch, part)
-                    },
-                )
-                .map(|(mut batch, mut part)| {
-                    let take = |c| part.extend(Some(c).filter(|c| choose(greedy, c)));
-                    greedy.evaluate_in(&mut batch, None, take);
-                    part
-                })
-                .collect();
+            let part = |part: usize| {
+                let begin = block.start + part * PART_FACES;
+                let faces = (begin..block.end.min(begin + PART_FACES)).map(FaceId::new);
+                let mesh = &greedy.surface.mesh;
+                let edges = faces.filter(|&f| mesh.is_live_face(f)).flat_map(FaceId::edges);
+                let names: Vec<EdgeId> = edges.filter(|&e| mesh.canonical(e) == e).collect();
+                let mut candidates = Vec::with_capacity(names.len());
+                greedy.evaluate_all(&names, |c| candidates.push(c));
+                candidates.retain(|c| choose(greedy, c));
+                candidates
+            };
+            let parts: Vec<Vec<Candidate>> = (0..parts).into_par_iter().map(part).collect();
             for candidate in parts.into_iter().flatten() {
                 is_any = true;
                 self.queue.push(candidate);
@@ -311,51 +283,45 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
 
     #[inline]
     fn evaluate(&self, e: EdgeId) -> Option<Evaluation> {
-        let held = self.surface.held(e);
-        if held == [true; 2] {
-            return None;
-        }
-        let [evaluation, ..] = self.cost.evaluate(&self.surface, &[e; LANES], &[held; LANES]);
-        evaluation
+        self.cost.evaluate(&self.surface, e, self.surface.held(e))
     }
 
-    /// Adds an edge to a batch, or none to evaluate what is in it, and gives the candidates of those
-    /// that were evaluated.
+    /// Gives the candidates of edges, in any order.
     #[inline]
-    fn evaluate_in(&self, batch: &mut Batch, e: Option<EdgeId>, mut give: impl FnMut(Candidate)) {
-        if let Some(edge) = e {
-            let held = self.surface.held(edge);
-            if held == [true; 2] {
-                let price = self.fill_price(edge);
-                price.into_iter().for_each(|price| {
-                    give(Candidate {
-                        cost: price as f32,
-                        edge,
-                    });
-                });
-                return;
-            }
-            batch.edges[batch.count] = edge;
-            batch.held[batch.count] = held;
-            batch.count += 1;
-        }
-        if batch.count < if e.is_some() { LANES } else { 1 } {
-            return;
-        }
-        for lane in batch.count..LANES {
-            batch.edges[lane] = batch.edges[0];
-            batch.held[lane] = batch.held[0];
-        }
-        let evaluations = self.cost.evaluate(&self.surface, &batch.edges, &batch.held);
-        for (evaluation, &edge) in evaluations.iter().zip(&batch.edges[..batch.count]) {
-            let cost = evaluation.map(|evaluation| evaluation.cost);
-            let cheaper = cost.into_iter().chain(self.fill_price(edge));
-            if let Some(cost) = cheaper.reduce(f64::min) {
-                let cost = cost as f32;
+    fn evaluate_all(&self, edges: &[EdgeId], mut give: impl FnMut(Candidate)) {
+        let mut give = |edge: EdgeId, cost: f32| {
+            let price = self.fill_price(edge).map(|price| price as f32);
+            let cost = price.map_or(cost, |price| price.min(cost));
+            if cost.is_finite() {
                 give(Candidate { cost, edge });
             }
+        };
+        let mut batch = [EdgeId::new(0); LANES];
+        let mut count = 0;
+        for &e in edges {
+            match self.surface.held(e) {
+                [false, false] => {
+                    batch[count] = e;
+                    count += 1;
+                }
+                [true, true] => give(e, f32::NAN),
+                held => {
+                    let evaluation = self.cost.evaluate(&self.surface, e, held);
+                    give(e, evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32));
+                }
+            }
+            if count == LANES {
+                let costs = self.cost.costs(&self.surface, &batch);
+                (0..LANES).for_each(|i| give(batch[i], costs[i]));
+                count = 0;
+            }
         }
-        batch.count = 0;
+        if count > 0 {
+            let first = batch[0];
+            batch[count..].fill(first);
+            let costs = self.cost.costs(&self.surface, &batch);
+            (0..count).for_each(|i| give(batch[i], costs[i]));
+        }
     }
 
     /// Whether the topology may change here: not where creases are to be kept.
@@ -539,11 +505,9 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             self.free_vertices.push(merged.collapse.removed);
             for e in std::mem::take(&mut self.waiting) {
                 if self.surface.mesh.is_live_face(e.face()) {
-                    let mut batch = Batch::default();
                     let mut found = None;
                     let name = self.surface.mesh.canonical(e);
-                    self.evaluate_in(&mut batch, Some(name), |c| found = Some(c));
-                    self.evaluate_in(&mut batch, None, |c| found = Some(c));
+                    self.evaluate_all(&[name], |c| found = Some(c));
                     found.into_iter().for_each(|c| self.queue.push(c));
                 }
             }
@@ -582,12 +546,10 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                 }
             }
         }
-        let mut found: SmallVec<[Candidate; LANES]> = SmallVec::new();
-        let mut batch = Batch::default();
-        for e in edges.iter().copied().map(Some).chain([None]) {
-            self.evaluate_in(&mut batch, e, |candidate| found.push(candidate));
-            found.drain(..).for_each(|candidate| self.queue.push(candidate));
-        }
+        let mut found = std::mem::take(&mut self.found);
+        self.evaluate_all(&edges, |candidate| found.push(candidate));
+        found.drain(..).for_each(|candidate| self.queue.push(candidate));
+        self.found = found;
         self.edges = edges;
     }
 

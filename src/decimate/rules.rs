@@ -13,7 +13,7 @@ const THIN: f32 = 1e-6;
 const LANES: usize = 8;
 
 /// Faces of a fan that are gathered at a time.
-const GATHERED: usize = 4 * LANES;
+const GATHERED: usize = 2 * LANES;
 
 /// The largest distance of `position` from the planes of the faces and the lines of the boundary
 /// edges at both ends of `e`, in the unit box; nothing where a face that stays would turn by 90° or
@@ -28,7 +28,7 @@ pub fn distance_from_star<S: EdgeStore>(
     position: Vec3,
 ) -> Option<f32> {
     let [v, w] = mesh.edge_vertices(e);
-    let mut squared = 0.0f32;
+    let mut faces = Faces::new(geometry);
     for (end, other) in [(v, w), (w, v)] {
         let point = geometry.position(end);
         if point == position {
@@ -44,10 +44,9 @@ pub fn distance_from_star<S: EdgeStore>(
                     0.0
                 }
             };
-            let mut faces = Faces::new(point, offset, geometry);
             let first = mesh.head(start);
-            squared = squared.max(from_line(start, first));
-            faces.begin(geometry.position(first), first == other);
+            let at_first = from_line(start, first);
+            faces.begin(point, offset, geometry.position(first), first == other);
             let mut last = (start, first);
             for d in mesh.fan(start) {
                 let before = mesh.prev(d);
@@ -55,11 +54,11 @@ pub fn distance_from_star<S: EdgeStore>(
                 faces.add(geometry.position(apex), apex == other)?;
                 last = (before, apex);
             }
-            squared = squared.max(from_line(last.0, last.1));
-            squared = squared.max(faces.end()?);
+            faces.look()?;
+            faces.squared = faces.squared.max(at_first).max(from_line(last.0, last.1));
         }
     }
-    Some(squared.sqrt())
+    Some(faces.squared.sqrt())
 }
 
 fn distance_squared_from_line(along: Vec3, offset: Vec3) -> f32 {
@@ -82,15 +81,16 @@ struct Faces {
     /// All bits where the vertex on the rim is the edge's other end, so that the faces there go.
     is_other: [u32; GATHERED + 1],
     count: usize,
+    /// The largest squared distance from their planes so far.
     squared: f32,
 }
 
 impl Faces {
     #[inline]
-    fn new(point: Vec3, offset: Vec3, geometry: &Geometry) -> Self {
+    fn new(geometry: &Geometry) -> Self {
         Self {
-            point,
-            offset,
+            point: Vec3::ZERO,
+            offset: Vec3::ZERO,
             scale: geometry.scale() as f32,
             rim: [[0.0; GATHERED + 1]; 3],
             is_other: [0; GATHERED + 1],
@@ -108,9 +108,10 @@ impl Faces {
         self.is_other[i] = if is_other { u32::MAX } else { 0 };
     }
 
-    /// The first vertex on the rim.
+    /// A fan around a vertex at `point` that moves by `offset`, and the first vertex on its rim.
     #[inline]
-    fn begin(&mut self, position: Vec3, is_other: bool) {
+    fn begin(&mut self, point: Vec3, offset: Vec3, position: Vec3, is_other: bool) {
+        (self.point, self.offset, self.count) = (point, offset, 0);
         self.put(0, position, is_other);
     }
 
@@ -130,14 +131,7 @@ impl Faces {
         Some(())
     }
 
-    /// The largest squared distance from the planes of the faces; nothing where a face turns.
-    #[inline]
-    fn end(mut self) -> Option<f32> {
-        self.look()?;
-        Some(self.squared)
-    }
-
-    /// Looks at the faces gathered.
+    /// Looks at the faces gathered. Nothing where one turns.
     #[inline]
     fn look(&mut self) -> Option<()> {
         // The lanes behind the last face hold faces without area.

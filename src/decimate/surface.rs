@@ -153,13 +153,18 @@ impl<S: EdgeStore> Surface<S> {
     /// Which ends of `e` stay where they are if it collapses, tail first.
     #[inline]
     pub fn held(&self, e: EdgeId) -> [bool; 2] {
-        if self.locked.is_empty() && self.creases.is_empty() && self.seam.is_empty() {
-            return [false; 2];
-        }
         let ends = self.mesh.edge_vertices(e);
-        if ends.iter().any(|&v| self.is_on_seam(v)) {
+        if !self.seam.is_empty() && (self.is_on_seam(ends[0]) | self.is_on_seam(ends[1])) {
             return [true; 2];
         }
+        if self.locked.is_empty() && self.creases.is_empty() {
+            return [false; 2];
+        }
+        self.held_by_lock_or_crease(e)
+    }
+
+    fn held_by_lock_or_crease(&self, e: EdgeId) -> [bool; 2] {
+        let ends = self.mesh.edge_vertices(e);
         let mut held = ends.map(|v| self.is_locked(v));
         if !self.creases.is_empty() {
             let free = if self.is_curve(e) { 2 } else { 0 };

@@ -1,11 +1,12 @@
 //! The *fast* cost: quadrics of the original's planes, added up (Garland & Heckbert 1997), with
 //! area weights and boundary lines.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
+use wide::f32x4;
 
-use super::form::{Form, Lanes, dot, plus};
+use super::form::{Form, Least, Number, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, TIE_BREAK, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
@@ -40,10 +41,28 @@ impl Quadric {
 /// trace times the squared edge length: single precision's noise.
 const AS_GOOD: f64 = 1e-6;
 
-/// The numbers of all lanes, from each lane's.
+/// Where the energy of two quadrics' vertices is least, `along` the edge from the first to the second.
 #[inline(always)]
-fn transposed<const N: usize>(lanes: [[f32; N]; LANES]) -> [Lanes; N] {
-    std::array::from_fn(|i| Lanes::from([lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]]))
+fn least<T: Number>(
+    at_v: &[T; 10],
+    at_w: &[T; 10],
+    along: [T; 3],
+    placement: Placement,
+) -> Least<T> {
+    let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_v] = *at_v;
+    let (a_v, b_v) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
+    let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_w] = *at_w;
+    let (a_w, b_w) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
+    let mut form = Form::of_ends(&a_v, &a_w, along);
+    form.b = plus(&form.b, &plus(&b_v, &b_w));
+    let b_along = dot(&b_w, &form.along);
+    form.at_tail = form.at_tail + (b_along + b_along) + (c_v + c_w);
+    let as_good = match placement {
+        Placement::Optimal => AS_GOOD,
+        // Nothing is better than the better end.
+        Placement::Endpoint => f64::INFINITY,
+    };
+    form.compared(&form.least_near_middle(), as_good)
 }
 
 /// The accumulated cost.
@@ -124,43 +143,45 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     }
 
     #[inline]
-    fn evaluate(
-        &self,
-        surface: &Surface<S>,
-        edges: &[EdgeId; LANES],
-        held: &[[bool; 2]; LANES],
-    ) -> [Option<Evaluation>; LANES] {
+    fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
+        let ends = surface.mesh.edge_vertices(e);
+        let along = surface.geometry.between(ends[0], ends[1]);
+        let [at_v, at_w] = ends.map(|v| self.quadrics[v.index()].0.map(f64::from));
+        let least = least(&at_v, &at_w, along.to_array(), self.placement);
+        let choice = Choice {
+            x_is_better: least.x_is_better,
+            head_is_better: least.head_is_better,
+            energies: [least.at_tail, least.at_head, least.at_x],
+            x: least.x.into(),
+            length_squared: least.length_squared,
+        };
+        choice.evaluation(surface, ends, held, self.placement)
+    }
+
+    #[inline]
+    fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
         let ends = edges.map(|e| surface.mesh.edge_vertices(e));
-        let at = |end: usize| ends.map(|ends| surface.geometry.position(ends[end]).to_array());
-        let (from, to): ([Lanes; 3], [Lanes; 3]) = (transposed(at(0)), transposed(at(1)));
-        let scale = Lanes::splat(surface.geometry.scale() as f32);
+        let at = |end: usize| {
+            let positions = ends.map(|ends| surface.geometry.position(ends[end]));
+            let [x, y, z, _] = f32x4::transpose(positions.map(|p| f32x4::new([p.x, p.y, p.z, 0.0])));
+            [x, y, z]
+        };
+        let (from, to) = (at(0), at(1));
+        let scale = f32x4::splat(surface.geometry.scale() as f32);
         let along = std::array::from_fn(|i| (to[i] - from[i]) * scale);
-        let numbers = |end: usize| transposed(ends.map(|ends| self.quadrics[ends[end].index()].0));
-        let (at_v, at_w): ([Lanes; 10], [Lanes; 10]) = (numbers(0), numbers(1));
-        let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_v] = at_v;
-        let (a_v, b_v) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
-        let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_w] = at_w;
-        let (a_w, b_w) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
-        let mut form = Form::of_ends(&a_v, &a_w, along);
-        form.b = plus(&form.b, &plus(&b_v, &b_w));
-        let b_along = dot(&b_w, &form.along);
-        form.at_tail = form.at_tail + (b_along + b_along) + (c_v + c_w);
-        let least = form.compared(&form.least_near_middle(), AS_GOOD);
-        let [x, y, z] = least.x.map(Lanes::to_array);
-        let [at_tail, at_head, at_x, length_squared] =
-            [least.at_tail, least.at_head, least.at_x, least.length_squared].map(Lanes::to_array);
-        let [x_is_better, head_is_better] =
-            [least.x_is_better, least.head_is_better].map(Lanes::to_bitmask);
-        std::array::from_fn(|i| {
-            let choice = Choice {
-                x_is_better: x_is_better >> i & 1 != 0,
-                head_is_better: head_is_better >> i & 1 != 0,
-                energies: [at_tail[i].into(), at_head[i].into(), at_x[i].into()],
-                x: Vec3::new(x[i], y[i], z[i]).as_dvec3(),
-                length_squared: length_squared[i].into(),
+        let numbers = |end: usize| {
+            let quadrics = ends.map(|ends| &self.quadrics[ends[end].index()].0);
+            let part = |i: usize| {
+                f32x4::transpose(quadrics.map(|q| f32x4::new([q[i], q[i + 1], q[i + 2], q[i + 3]])))
             };
-            choice.evaluation(surface, ends[i], held[i], self.placement)
-        })
+            let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (part(0), part(4), part(6));
+            [a, b, c, d, e, f, g, h, i, j]
+        };
+        let least = least(&numbers(0), &numbers(1), along, self.placement);
+        let at_end = Number::choose(least.head_is_better, least.at_head, least.at_tail);
+        let energy = Number::choose(least.x_is_better, least.at_x, at_end);
+        let energy = Number::choose(energy.greater(f32x4::ZERO), energy, f32x4::ZERO);
+        (energy + f32x4::splat(TIE_BREAK as f32) * least.length_squared).to_array()
     }
 
     fn after_collapse(

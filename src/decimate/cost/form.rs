@@ -21,9 +21,6 @@ pub trait Number:
     /// Whether the first is greater. No, where one is no number.
     fn greater(self, other: Self) -> Self::Mask;
 
-    /// Both.
-    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-
     /// The first where `yes`, elsewhere the second.
     fn choose(yes: Self::Mask, a: Self, b: Self) -> Self;
 }
@@ -39,11 +36,6 @@ impl Number for f64 {
     #[inline(always)]
     fn greater(self, other: Self) -> bool {
         self > other
-    }
-
-    #[inline(always)]
-    fn both(a: bool, b: bool) -> bool {
-        a & b
     }
 
     #[inline(always)]
@@ -66,11 +58,6 @@ impl Number for Lanes {
     #[inline(always)]
     fn greater(self, other: Self) -> Self {
         self.simd_gt(other)
-    }
-
-    #[inline(always)]
-    fn both(a: Self, b: Self) -> Self {
-        a & b
     }
 
     #[inline(always)]

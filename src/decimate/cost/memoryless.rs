@@ -221,13 +221,16 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     fn join((): &mut (), (): &()) {}
 
     #[inline]
-    fn evaluate(
-        &self,
-        surface: &Surface<S>,
-        edges: &[EdgeId; LANES],
-        held: &[[bool; 2]; LANES],
-    ) -> [Option<Evaluation>; LANES] {
-        std::array::from_fn(|i| self.evaluate_one(surface, edges[i], held[i]))
+    fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
+        self.evaluate_one(surface, e, held)
+    }
+
+    #[inline]
+    fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
+        edges.map(|e| {
+            let evaluation = self.evaluate_one(surface, e, [false; 2]);
+            evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
+        })
     }
 
     fn after_collapse(

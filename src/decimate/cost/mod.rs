@@ -51,13 +51,13 @@ pub trait Cost<S: EdgeStore>: Send + Sync {
     /// Adds to a state what other faces or lines say.
     fn join(state: &mut Self::State, part: &Self::State);
 
-    /// The collapses of edges, each with its tail or head held in place.
-    fn evaluate(
-        &self,
-        surface: &Surface<S>,
-        edges: &[EdgeId; LANES],
-        held: &[[bool; 2]; LANES],
-    ) -> [Option<Evaluation>; LANES];
+    /// The collapse of `e` with its tail or head held in place; nothing where both are held, or
+    /// where the numbers fail.
+    fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation>;
+
+    /// What the collapses of edges of which no end is held cost, about as
+    /// [`evaluate`](Self::evaluate) says; not finite where it says nothing.
+    fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES];
 
     /// Brings the state up to date after a collapse, and lists the vertices whose edges cost
     /// something else now.
@@ -99,12 +99,6 @@ pub(super) const BOUNDARY_WEIGHT: f64 = 8.0;
 
 /// Squared edge length enters with this weight, so that ties in flat regions go to short edges.
 const TIE_BREAK: f64 = 1e-12;
-
-/// Squared edge length enters with this weight, so that ties in flat regions go to short edges.
-const TIE_BREAK: f64 = 1e-12;
-
-/// How far the optimum may lie from the middle, in lengths of the edge.
-const REACH: f64 = 3.0;
 
 /// The weight of a boundary edge's line, by what boundaries may do.
 fn boundary_weight(boundary: Boundary) -> f64 {
