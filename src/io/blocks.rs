@@ -77,9 +77,11 @@ impl Blocks {
         self.end -= self.start;
         self.start = 0;
         while self.end < wanted {
-            if self.end == self.buffer.len() {
-                let larger = (2 * self.buffer.len()).max(BLOCK_BYTES);
-                self.buffer.resize(larger, 0);
+            if self.buffer.is_empty() {
+                // Fresh zeros cost nothing before they are read into.
+                self.buffer = vec![0; BLOCK_BYTES];
+            } else if self.end == self.buffer.len() {
+                self.buffer.resize(2 * self.buffer.len(), 0);
             }
             match self.input.reader.read(&mut self.buffer[self.end..]) {
                 Ok(0) => break,

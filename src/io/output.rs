@@ -197,7 +197,8 @@ fn write_records<const N: usize, T>(
     fill: impl Fn(&mut [u8; N], T),
 ) -> io::Result<()> {
     // As much as the writer behind it holds, which then hands it through.
-    let mut block = vec![[0; N]; BLOCK_BYTES.div_ceil(N)];
+    let most = items.size_hint().1.unwrap_or(usize::MAX);
+    let mut block = vec![[0; N]; BLOCK_BYTES.div_ceil(N).min(most.saturating_add(1))];
     loop {
         let mut filled = 0;
         for (record, item) in block.iter_mut().zip(&mut items) {
