@@ -280,6 +280,28 @@ pub struct MeshBuilder {
 const FAR: f64 = 16.0;
 
 impl MeshBuilder {
+    /// Makes room for exactly so many more vertices, if there is room for them.
+    pub fn reserve_vertices(&mut self, vertices: usize) {
+        // Without it the array grows as the vertices come.
+        let _ = self.singles.try_reserve_exact(vertices.min(MAX_VERTICES));
+    }
+
+    /// Makes room for exactly so many more triangles, if there is room for them.
+    pub fn reserve_triangles(&mut self, triangles: usize) {
+        let triangles = triangles.min(MAX_TRIANGLES);
+        let _ = self.triangles.try_reserve_exact(triangles);
+    }
+
+    /// Adds vertices with single-precision coordinates.
+    pub fn push_singles(&mut self, positions: impl Iterator<Item = [f32; 3]>) {
+        if self.doubles.is_empty() {
+            self.singles.extend(positions.map(Vec3::from));
+        } else {
+            self.doubles
+                .extend(positions.map(|p| DVec3::from(p.map(f64::from))));
+        }
+    }
+
     /// Adds a vertex with single-precision coordinates and returns its index.
     pub fn push_single(&mut self, position: [f32; 3]) -> usize {
         if self.doubles.is_empty() {
@@ -298,7 +320,8 @@ impl MeshBuilder {
                 return self.push_single(position.map(|x| x as f32));
             }
             let singles = std::mem::take(&mut self.singles);
-            self.doubles = singles.into_iter().map(Vec3::as_dvec3).collect();
+            let _ = self.doubles.try_reserve_exact(singles.capacity());
+            self.doubles.extend(singles.into_iter().map(Vec3::as_dvec3));
         }
         self.doubles.push(position.into());
         self.doubles.len() - 1
@@ -308,6 +331,11 @@ impl MeshBuilder {
     /// the place in its file checks them before.
     pub fn push_triangle(&mut self, triangle: [u32; 3]) {
         self.triangles.push(triangle);
+    }
+
+    /// Adds triangles, as [`push_triangle`](Self::push_triangle) does.
+    pub fn push_triangles(&mut self, triangles: impl Iterator<Item = [u32; 3]>) {
+        self.triangles.extend(triangles);
     }
 
     /// Adds a polygon as the fan of triangles around its first corner.

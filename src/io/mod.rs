@@ -7,14 +7,17 @@
 //! | STL | binary, ASCII; every facet has three vertices of its own | binary, ASCII |
 //! | OFF | OFF, COFF, NOFF, CNOFF, STOFF as text | text |
 //!
-//! Files are read in blocks, from standard input as from disk. What a header promises never sizes
-//! an allocation; what is neither connectivity nor position, nor the weight asked for, is skipped.
+//! Files are read in blocks, from standard input as from disk. What a header promises sizes no
+//! allocation beyond what the length of the file bears out; what is neither connectivity nor
+//! position, nor the weight asked for, is skipped.
 
+mod blocks;
 mod input;
 mod obj;
 mod off;
 mod output;
 mod ply;
+mod ply_binary;
 mod ply_header;
 mod stl;
 mod text;

@@ -1,21 +1,20 @@
 //! Wavefront OBJ: the `v` and `f` lines, as one mesh with the file's own vertex numbers.
 //!
-//! tobj parses the vertices, in blocks of lines. Handed the whole file it would keep more than 100
-//! bytes a face until the end (room for four corners of three `usize`), renumber the vertices by
-//! first use, drop the unused ones, which the report counts, and name no line in its errors.
+//! Line by line, not through tobj: that keeps more than 100 bytes a face until the end (room for
+//! four corners of three `usize`), renumbers the vertices by first use, drops the unused ones, which
+//! the report counts, and names no line in its errors. A test holds our numbers against its.
 
 use crate::error::Result;
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
 
 use super::input::Input;
-use super::text::{Lines, count, not_finite, parse_integer, quote};
+use super::text::{Lines, count, parse_integer, parse_number, quote};
 
 /// Reads an OBJ file. Groups, objects, materials, normals and texture coordinates are skipped;
 /// a face of one or two corners is none.
 pub(super) fn read(input: Input) -> Result<IndexedMesh> {
     let mut lines = Lines::new(input)?;
     let mut builder = MeshBuilder::default();
-    let mut block = VertexBlock::default();
     let mut highest = Highest::default();
     let mut corners = Vec::new();
     let mut any = false;
@@ -24,14 +23,11 @@ pub(super) fn read(input: Input) -> Result<IndexedMesh> {
         match words.next() {
             Some(b"v") => {
                 any = true;
-                block.push(words, lines.number());
-                if block.lines.len() == BLOCK_LINES {
-                    block.move_into(&mut builder, &lines)?;
-                }
+                builder.push_double(parse_vertex(words, &lines)?);
             }
             Some(b"f") => {
                 any = true;
-                let vertices = builder.vertex_count() + block.lines.len();
+                let vertices = builder.vertex_count();
                 corners.clear();
                 for word in words {
                     corners.push(parse_corner(word, vertices, &lines)?);
@@ -42,12 +38,24 @@ pub(super) fn read(input: Input) -> Result<IndexedMesh> {
             _ => {}
         }
     }
-    block.move_into(&mut builder, &lines)?;
     highest.check(builder.vertex_count(), &lines)?;
     if !any {
         return Err(lines.error_in_file("no line begins with v or f", "Wavefront OBJ"));
     }
     builder.finish()
+}
+
+/// Three coordinates; a weight or a colour behind them is dropped.
+fn parse_vertex<'a>(words: impl Iterator<Item = &'a [u8]>, lines: &Lines) -> Result<[f64; 3]> {
+    let mut position = [0.0; 3];
+    let mut numbers = words.take(3).map(parse_number);
+    for x in &mut position {
+        *x = numbers.next().flatten().ok_or_else(|| {
+            let vertex: Vec<_> = lines.words().take(4).collect();
+            lines.error(&quote(&vertex.join(&b' ')), "v and three numbers")
+        })?;
+    }
+    Ok(position)
 }
 
 /// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0.
@@ -111,67 +119,6 @@ impl Highest {
     }
 }
 
-/// How many vertices tobj gets at a time: enough that its set-up does not count, and few enough to
-/// stay in the cache.
-const BLOCK_LINES: usize = 4096;
-
-/// Vertex lines on their way through tobj.
-#[derive(Default)]
-struct VertexBlock {
-    /// An OBJ file of its own: each `v` line with its first three words, and behind it the face of
-    /// one corner that makes tobj keep the vertex.
-    text: Vec<u8>,
-    /// The line in the file of each vertex.
-    lines: Vec<usize>,
-}
-
-impl VertexBlock {
-    /// Takes a vertex line in: three coordinates; a weight or a colour behind them is dropped.
-    fn push<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>, line: usize) {
-        self.text.push(b'v');
-        for word in words.take(3) {
-            self.text.push(b' ');
-            match std::str::from_utf8(word).ok().and_then(not_finite) {
-                Some(value) => self.text.extend_from_slice(value.to_string().as_bytes()),
-                None => self.text.extend_from_slice(word),
-            }
-        }
-        self.text.extend_from_slice(b"\nf -1\n");
-        self.lines.push(line);
-    }
-
-    /// Hands the vertices over and is empty again.
-    fn move_into(&mut self, builder: &mut MeshBuilder, lines: &Lines) -> Result<()> {
-        let positions = parse_vertices(&self.text).ok_or_else(|| self.first_error(lines))?;
-        for &position in positions.as_chunks().0 {
-            builder.push_double(position);
-        }
-        self.text.clear();
-        self.lines.clear();
-        Ok(())
-    }
-
-    /// The error in the first line that tobj cannot parse.
-    fn first_error(&self, lines: &Lines) -> crate::error::Error {
-        let vertices = self.text.split(|&b| b == b'\n').step_by(2);
-        let (line, text) = self
-            .lines
-            .iter()
-            .zip(vertices)
-            .find(|(_, text)| parse_vertices(&[text, b"\nf -1\n".as_slice()].concat()).is_none())
-            .expect("a block that does not parse has a line that does not");
-        lines.error_at(*line, &quote(text), "v and three numbers")
-    }
-}
-
-/// The coordinates of a block's vertices, in its order.
-fn parse_vertices(mut text: &[u8]) -> Option<Vec<f64>> {
-    let options = tobj::LoadOptions::default();
-    let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut text, &options, no_materials).ok()?;
-    models.into_iter().next().map(|model| model.mesh.positions)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -221,7 +168,7 @@ mod tests {
         assert_eq!(mesh.positions().len(), 5);
     }
 
-    /// tobj alone would number the vertices 2, 0 first and drop the unused ones.
+    /// Numbered by first use they would come as 4, 2, 3.
     #[test]
     fn vertices_keep_their_order_and_the_unused_stay() {
         let mesh = mesh("v 9 9 9\nf 4 2 3\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 8 8 8\n");
@@ -230,18 +177,32 @@ mod tests {
         assert_eq!(x, [9.0, 1.0, 2.0, 3.0, 8.0]);
     }
 
+    /// Numbers of every length and spelling; the face of one corner behind each vertex makes tobj
+    /// keep it, in its order.
     #[test]
-    fn more_than_one_block_of_vertices_stays_in_order() {
-        let n = 2 * BLOCK_LINES + 3;
-        let text: String = (0..n).map(|i| format!("v {i} 0 0 0.5 0.5 0.5\n")).collect();
-        let mesh = mesh(&format!("{text}f 1 -1 2\n"));
-        assert!(
-            mesh.positions()
-                .iter()
-                .enumerate()
-                .all(|(i, p)| p.x == i as f32)
-        );
-        assert_eq!(mesh.triangles(), [[0, n as u32 - 1, 1]]);
+    fn tobj_reads_the_same_numbers() {
+        let number = |i: usize| match i % 7 {
+            0 => format!("{}", i as f64 / 7.0),
+            1 => format!("-{}.{:03}", i % 11, i * 37 % 1000),
+            2 => format!("{:e}", (i as f64).sqrt()),
+            3 => format!("{i}."),
+            4 => format!(".{i}"),
+            5 => format!("+{}", i as f32 / 3.0),
+            _ => format!("{:.20}", 1.0 / (1.0 + i as f64)),
+        };
+        let mut text = String::new();
+        for v in 0..4000 {
+            let [x, y, z] = [3 * v, 3 * v + 1, 3 * v + 2].map(number);
+            text += &format!("v {x} {y} {z}\nf -1\n");
+        }
+        let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+        let options = tobj::LoadOptions::default();
+        let theirs = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials);
+        let theirs = &theirs.unwrap().0[0].mesh.positions;
+        let theirs = theirs.iter().map(|&x| (x as f32).to_bits());
+        let ours = mesh(&text);
+        let ours = ours.positions().iter().flat_map(|p| p.to_array());
+        assert!(ours.map(f32::to_bits).eq(theirs));
     }
 
     #[test]

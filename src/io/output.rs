@@ -171,22 +171,58 @@ fn ply_header(writer: &mut dyn Write, mesh: &IndexedMesh, encoding: &str) -> io:
 /// Binary little-endian PLY.
 pub(super) fn ply_binary(writer: &mut dyn Write, mesh: &IndexedMesh) -> io::Result<()> {
     ply_header(writer, mesh, "binary_little_endian")?;
-    for v in 0..mesh.positions().len() {
-        for x in point(mesh, v) {
-            match Scalar::of(mesh) {
-                Scalar::Float => writer.write_all(&(x as f32).to_le_bytes())?,
-                Scalar::Double => writer.write_all(&x.to_le_bytes())?,
-            }
+    match Scalar::of(mesh) {
+        Scalar::Float => write_records(
+            writer,
+            mesh.positions().iter(),
+            |record: &mut [u8; 12], p| {
+                record.copy_from_slice(p.to_array().map(f32::to_le_bytes).as_flattened());
+            },
+        ),
+        Scalar::Double => write_records(writer, mesh.points(), |record: &mut [u8; 24], p| {
+            record.copy_from_slice(p.to_array().map(f64::to_le_bytes).as_flattened());
+        }),
+    }?;
+    let face = |record: &mut [u8; 13], corners: [u32; 3]| {
+        record[0] = 3;
+        record[1..].copy_from_slice(corners.map(u32::to_le_bytes).as_flattened());
+    };
+    write_sides(writer, mesh, face)
+}
+
+/// Writes a record of `N` bytes for each item, in blocks.
+fn write_records<const N: usize, T>(
+    writer: &mut dyn Write,
+    mut items: impl Iterator<Item = T>,
+    fill: impl Fn(&mut [u8; N], T),
+) -> io::Result<()> {
+    // As much as the writer behind it holds, which then hands it through.
+    let most = items.size_hint().1.unwrap_or(usize::MAX);
+    let mut block = vec![[0; N]; BLOCK_BYTES.div_ceil(N).min(most.saturating_add(1))];
+    loop {
+        let mut filled = 0;
+        for (record, item) in block.iter_mut().zip(&mut items) {
+            fill(record, item);
+            filled += 1;
+        }
+        writer.write_all(block[..filled].as_flattened())?;
+        if filled < block.len() {
+            return Ok(());
         }
     }
-    for triangle in mesh.sides() {
-        let mut bytes = [3; 13];
-        for (to, v) in bytes[1..].as_chunks_mut().0.iter_mut().zip(triangle) {
-            *to = v.to_le_bytes();
-        }
-        writer.write_all(&bytes)?;
+}
+
+/// Writes a record of `N` bytes for each triangle that a file of the mesh holds, in blocks.
+fn write_sides<const N: usize>(
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    fill: impl Fn(&mut [u8; N], [u32; 3]),
+) -> io::Result<()> {
+    if mesh.double_sided().is_empty() {
+        write_records(writer, mesh.triangles().iter().copied(), fill)
+    } else {
+        write_records(writer, mesh.sides(), fill)
     }
-    Ok(())
 }
 
 /// ASCII PLY.
@@ -255,21 +291,12 @@ pub(super) fn stl_binary(writer: &mut dyn Write, mesh: &IndexedMesh) -> io::Resu
     let count = u32::try_from(mesh.triangle_count()).expect("2^31-1 edges are fewer triangles");
     header[80..].copy_from_slice(&count.to_le_bytes());
     writer.write_all(&header)?;
-    for triangle in mesh.sides() {
+    write_sides(writer, mesh, |record: &mut [u8; 50], triangle| {
         let corners = triangle.map(|v| point(mesh, v as usize));
-        let mut bytes = [0; 50];
         let numbers = [normal(corners), corners[0], corners[1], corners[2]];
-        for (to, &x) in bytes
-            .as_chunks_mut()
-            .0
-            .iter_mut()
-            .zip(numbers.as_flattened())
-        {
-            *to = (x as f32).to_le_bytes();
-        }
-        writer.write_all(&bytes)?;
-    }
-    Ok(())
+        let bytes = numbers.map(|numbers| numbers.map(|x| (x as f32).to_le_bytes()));
+        record[..48].copy_from_slice(bytes.as_flattened().as_flattened());
+    })
 }
 
 /// ASCII STL.

@@ -1,7 +1,7 @@
-//! PLY through ply-rs-bw, element by element: a face is on its way to the mesh before the next one
-//! is read.
+//! PLY, element by element: a face is on its way to the mesh before the next one is read. Plain
+//! layouts of binary files are decoded in `ply_binary`; ply-rs-bw serves the others, and ASCII.
 
-use std::io::{self, BufReader, ErrorKind, Read};
+use std::io::{self, ErrorKind};
 
 use ply_rs_bw::parser::{ParseError, Parser};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
@@ -9,21 +9,35 @@ use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAcc
 use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
 
+use super::blocks::Blocks;
 use super::input::Input;
+use super::ply_binary::{Decoder, Plain};
 use super::ply_header::{self, AXES, CORNERS, Role, WEIGHT};
 use super::text::{Lines, parse_number, quote, words};
 
 /// Reads a PLY file: vertices, faces, triangle strips, and the vertex property that is asked for as
 /// weight. Other elements and properties are skipped.
-pub(super) fn read(mut input: Input, vertex_weight: Option<&str>) -> Result<IndexedMesh> {
+pub(super) fn read(input: Input, vertex_weight: Option<&str>) -> Result<IndexedMesh> {
+    read_with(input, vertex_weight, Plain::of)
+}
+
+/// Reads a PLY file in which `plain` finds the layouts of binary elements that are plain.
+pub(super) fn read_with(
+    mut input: Input,
+    vertex_weight: Option<&str>,
+    plain: impl Fn(&ElementDef, Option<&str>) -> Option<Plain>,
+) -> Result<IndexedMesh> {
     let header = ply_header::read(&mut input, vertex_weight)?;
-    let vertices = header.vertices();
+    let mut sink = Sink {
+        builder: MeshBuilder::default(),
+        weights: Vec::new(),
+        vertices: header.vertices(),
+    };
     let body = match header.encoding {
         Encoding::Ascii => Body::Ascii(Lines::after(input, header.lines)),
         encoding => Body::Binary {
-            little: encoding == Encoding::BinaryLittleEndian,
-            position: header.bytes,
-            input,
+            big: encoding == Encoding::BinaryBigEndian,
+            blocks: Blocks::after(input, header.bytes),
         },
     };
     let mut reader = ElementReader {
@@ -31,52 +45,96 @@ pub(super) fn read(mut input: Input, vertex_weight: Option<&str>) -> Result<Inde
         body,
         start: 0,
     };
-    let mut builder = MeshBuilder::default();
-    let mut weights = Vec::new();
-    let mut corners = Vec::new();
     // Without properties there is nothing to read, so no number of them would ever end the file.
     for def in header
         .elements
         .iter()
         .filter(|def| !def.properties.is_empty())
     {
-        let role = Role::of(def);
-        for i in 0..def.count {
-            let element = reader.next(def, i)?;
-            if let (Role::Vertex { .. }, Some(property)) = (role, vertex_weight) {
-                let weight = element.weight(property);
-                weights.push(single(weight).ok_or_else(|| reader.no_weight(i, weight))?);
+        if let Body::Binary { big, blocks } = &mut reader.body
+            && let Some(plain) = plain(def, vertex_weight)
+        {
+            let sink = &mut sink;
+            let mut decoder = Decoder { def, blocks, sink };
+            if *big {
+                decoder.read::<true>(&plain)?;
+            } else {
+                decoder.read::<false>(&plain)?;
             }
-            let outside = |v| reader.outside(def, i, v, vertices);
-            match role {
-                Role::Vertex { single: true } => {
-                    builder.push_single(element.position.map(|x| x as f32));
-                }
-                Role::Vertex { single: false } => {
-                    builder.push_double(element.position);
-                }
-                Role::Face => {
-                    element
-                        .corners(&mut corners, |v| corner(v, vertices))
-                        .map_err(outside)?;
-                    builder.push_polygon(&corners);
-                }
-                Role::Strips => {
-                    let corner = |v| {
-                        if v == -1 {
-                            Some(RESTART)
-                        } else {
-                            corner(v, vertices)
-                        }
-                    };
-                    element.corners(&mut corners, corner).map_err(outside)?;
-                    push_strips(&mut builder, &corners);
-                }
-                Role::Other => {}
-            }
+        } else {
+            reader.read_all(def, &mut sink, vertex_weight)?;
         }
     }
-    builder.finish()?.with_weights(weights)
+    sink.builder.finish()?.with_weights(sink.weights)
+}
+
+/// The mesh while it is read.
+pub(super) struct Sink {
+    pub builder: MeshBuilder,
+    weights: Vec<f32>,
+    /// How many the header promises.
+    pub vertices: usize,
+}
+
+impl Sink {
+    /// Takes the weight of the next vertex, or returns it where it is none.
+    pub fn push_weight(&mut self, weight: f64) -> std::result::Result<(), f64> {
+        self.weights.push(single(weight).ok_or(weight)?);
+        Ok(())
+    }
+
+    /// A vertex number, if there is such a vertex.
+    pub fn corner(&self, v: i64) -> std::result::Result<u32, Fault> {
+        u32::try_from(v)
+            .ok()
+            .filter(|&v| (v as usize) < self.vertices && v != RESTART)
+            .ok_or(Fault::Corner(v))
+    }
+}
+
+/// What can be wrong with an element.
+pub(super) enum Fault {
+    /// The file ends in it.
+    End,
+    NegativeLength,
+    /// A corner that names no vertex.
+    Corner(i64),
+    /// A weight that is none.
+    Weight(f64),
+}
+
+impl Fault {
+    /// What a message says about element `i` of those that `def` defines, in a file that promises
+    /// so many vertices.
+    pub fn found_and_expected(
+        self,
+        def: &ElementDef,
+        i: usize,
+        vertices: usize,
+    ) -> (String, String) {
+        let name = &def.name;
+        match self {
+            Fault::End => (
+                format!("the file ends in {name} {i}"),
+                format!("{} of them, as the header says", def.count),
+            ),
+            Fault::NegativeLength => (
+                format!("{name} {i} has a list of negative length"),
+                "a length of 0 or more".to_string(),
+            ),
+            Fault::Corner(v) => (
+                format!("{name} {i} uses vertex {v}"),
+                match vertices {
+                    0 => "vertices in the file".to_string(),
+                    n => format!("0 to {}", n - 1),
+                },
+            ),
+            Fault::Weight(weight) => (
+                format!("vertex {i} has the weight {weight}"),
+                "0 or more".to_string(),
+            ),
+        }
+    }
 }
 
 /// A weight in single precision, if it is one. Only what was infinite before is so behind, since that
@@ -88,13 +146,6 @@ fn single(weight: f64) -> Option<f32> {
         weight as f32
     };
     (single >= 0.0).then_some(single)
-}
-
-/// A vertex number, if there is such a vertex.
-fn corner(v: i64, vertices: usize) -> Option<u32> {
-    u32::try_from(v)
-        .ok()
-        .filter(|&v| (v as usize) < vertices && v != RESTART)
 }
 
 /// What stands between two strips of one list; more vertices than a mesh can have.
@@ -166,17 +217,16 @@ impl Element {
         axis.map_or(self.weight, |axis| self.position[axis])
     }
 
-    /// Fills `corners` from the list of whatever integers, or returns the first that `corner`
-    /// refuses.
+    /// Fills `corners` from the list of whatever integers, up to the first that `corner` refuses.
     fn corners(
         &self,
         corners: &mut Vec<u32>,
-        corner: impl Fn(i64) -> Option<u32>,
-    ) -> std::result::Result<(), i64> {
+        corner: impl Fn(i64) -> std::result::Result<u32, Fault>,
+    ) -> std::result::Result<(), Fault> {
         corners.clear();
         let mut fill = |list: &mut dyn Iterator<Item = i64>| {
             for v in list {
-                corners.push(corner(v).ok_or(v)?);
+                corners.push(corner(v)?);
             }
             Ok(())
         };
@@ -196,9 +246,9 @@ impl Element {
 enum Body {
     Ascii(Lines),
     Binary {
-        little: bool,
-        position: u64,
-        input: Input,
+        /// Whether numbers have their highest byte first.
+        big: bool,
+        blocks: Blocks,
     },
 }
 
@@ -210,6 +260,55 @@ struct ElementReader {
 }
 
 impl ElementReader {
+    /// Takes all elements that `def` defines into the mesh.
+    fn read_all(
+        &mut self,
+        def: &ElementDef,
+        sink: &mut Sink,
+        vertex_weight: Option<&str>,
+    ) -> Result<()> {
+        let role = Role::of(def);
+        let vertices = sink.vertices;
+        let mut corners = Vec::new();
+        for i in 0..def.count {
+            let element = self.next(def, i)?;
+            let fault = |fault: Fault| {
+                let (found, expected) = fault.found_and_expected(def, i, vertices);
+                self.error(&found, &expected)
+            };
+            match role {
+                Role::Vertex { single } => {
+                    if let Some(property) = vertex_weight {
+                        let pushed = sink.push_weight(element.weight(property));
+                        pushed.map_err(|weight| fault(Fault::Weight(weight)))?;
+                    }
+                    if single {
+                        let position = element.position.map(|x| x as f32);
+                        sink.builder.push_single(position);
+                    } else {
+                        sink.builder.push_double(element.position);
+                    }
+                }
+                Role::Face => {
+                    element
+                        .corners(&mut corners, |v| sink.corner(v))
+                        .map_err(fault)?;
+                    sink.builder.push_polygon(&corners);
+                }
+                Role::Strips => {
+                    let corner = |v| match v {
+                        -1 => Ok(RESTART),
+                        _ => sink.corner(v),
+                    };
+                    element.corners(&mut corners, corner).map_err(fault)?;
+                    push_strips(&mut sink.builder, &corners);
+                }
+                Role::Other => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Element `i` of those that `def` defines.
     fn next(&mut self, def: &ElementDef, i: usize) -> Result<Element> {
         match &mut self.body {
@@ -223,46 +322,27 @@ impl ElementReader {
                 let expected = format!("{} of them, as the header says", def.count);
                 Err(lines.error_at_end(&found, &expected))
             }
-            Body::Binary {
-                little,
-                position,
-                input,
-            } => {
-                self.start = *position;
-                let mut counted = Counted {
-                    reader: &mut input.reader,
-                    position,
-                };
-                let element = if *little {
-                    self.parser.read_little_endian_element(&mut counted, def)
+            Body::Binary { big, blocks } => {
+                self.start = blocks.position();
+                let element = if *big {
+                    self.parser.read_big_endian_element(blocks, def)
                 } else {
-                    self.parser.read_big_endian_element(&mut counted, def)
+                    self.parser.read_little_endian_element(blocks, def)
                 };
-                element.map_err(|e| binary_error(input, self.start, def, i, &e))
+                element.map_err(|e| binary_error(blocks, self.start, def, i, &e))
             }
         }
-    }
-
-    /// The error for a corner that names no vertex.
-    fn outside(&self, def: &ElementDef, i: usize, v: i64, vertices: usize) -> Error {
-        let found = format!("{} {i} uses vertex {v}", def.name);
-        let expected = match vertices {
-            0 => "vertices in the file".to_string(),
-            n => format!("0 to {}", n - 1),
-        };
-        self.error(&found, &expected)
-    }
-
-    /// The error for a weight that is none.
-    fn no_weight(&self, i: usize, weight: f64) -> Error {
-        self.error(&format!("vertex {i} has the weight {weight}"), "0 or more")
     }
 
     /// An error in the last element.
     fn error(&self, found: &str, expected: &str) -> Error {
         match &self.body {
             Body::Ascii(lines) => lines.error(found, expected),
-            Body::Binary { input, .. } => input.error(Place::Byte(self.start), found, expected),
+            Body::Binary { blocks, .. } => {
+                blocks
+                    .input()
+                    .error(Place::Byte(self.start), found, expected)
+            }
         }
     }
 }
@@ -313,42 +393,16 @@ fn respell(line: &[u8], nan: &str) -> Option<String> {
     Some(text)
 }
 
-fn binary_error(input: &Input, start: u64, def: &ElementDef, i: usize, e: &ParseError) -> Error {
-    let name = &def.name;
-    match e.kind() {
-        ErrorKind::UnexpectedEof => {
-            let found = format!("the file ends in {name} {i}");
-            let expected = format!("{} of them, as the header says", def.count);
-            input.error(Place::Byte(start), &found, &expected)
-        }
+fn binary_error(blocks: &Blocks, start: u64, def: &ElementDef, i: usize, e: &ParseError) -> Error {
+    let fault = match e.kind() {
+        ErrorKind::UnexpectedEof => Fault::End,
         // All that can be wrong with bytes, once the header's types have been checked.
-        ErrorKind::InvalidInput | ErrorKind::InvalidData => {
-            let found = format!("{name} {i} has a list of negative length");
-            input.error(Place::Byte(start), &found, "a length of 0 or more")
-        }
-        kind => input.io_error(io::Error::new(kind, e.to_string())),
-    }
-}
-
-/// Counts the bytes that go through.
-struct Counted<'a> {
-    reader: &'a mut BufReader<Box<dyn Read>>,
-    position: &'a mut u64,
-}
-
-impl Read for Counted<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let n = self.reader.read(buffer)?;
-        *self.position += n as u64;
-        Ok(n)
-    }
-
-    #[inline]
-    fn read_exact(&mut self, buffer: &mut [u8]) -> io::Result<()> {
-        self.reader.read_exact(buffer)?;
-        *self.position += buffer.len() as u64;
-        Ok(())
-    }
+        ErrorKind::InvalidInput | ErrorKind::InvalidData => Fault::NegativeLength,
+        kind => return blocks.input().io_error(io::Error::new(kind, e.to_string())),
+    };
+    // Neither fault is about vertices.
+    let (found, expected) = fault.found_and_expected(def, i, 0);
+    blocks.input().error(Place::Byte(start), &found, &expected)
 }
 
 #[cfg(test)]

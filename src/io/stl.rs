@@ -1,10 +1,9 @@
 //! STL, binary and ASCII: facets with three vertices of their own each.
 
-use std::io::{ErrorKind, Read};
-
 use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
 
+use super::blocks::Blocks;
 use super::input::Input;
 use super::text::{Lines, count, parse_number, quote, words};
 
@@ -12,8 +11,6 @@ use super::text::{Lines, count, parse_number, quote, words};
 const HEADER_BYTES: usize = 84;
 /// A normal, three vertices, two bytes of attributes.
 const FACET_BYTES: usize = 50;
-/// Facets read at a time.
-const BLOCK_FACETS: usize = 1024;
 
 /// Whether a file is binary STL because its length is the one that its count of triangles asks for,
 /// whatever its header says.
@@ -56,7 +53,7 @@ pub(super) fn read(input: Input) -> Result<IndexedMesh> {
     }
 }
 
-fn read_binary(mut input: Input) -> Result<IndexedMesh> {
+fn read_binary(input: Input) -> Result<IndexedMesh> {
     let Some(promised) = promised_facets(&input.head) else {
         let found = format!("{} bytes and no word 'solid'", input.head.len());
         return Err(input.error(
@@ -80,44 +77,38 @@ fn read_binary(mut input: Input) -> Result<IndexedMesh> {
     {
         return Err(wrong_length(&input, length, ""));
     }
-    let mut header = [0; HEADER_BYTES];
-    input
-        .reader
-        .read_exact(&mut header)
-        .map_err(|e| input.io_error(e))?;
+    let known = input.length.is_some();
+    let mut blocks = Blocks::after(input, 0);
+    blocks.peek(HEADER_BYTES)?;
+    blocks.consume(HEADER_BYTES);
+    let promised_facets = promised as usize;
     let mut builder = MeshBuilder::default();
-    let mut block = vec![0; BLOCK_FACETS * FACET_BYTES];
-    let mut left = promised as usize;
-    while left > 0 {
-        let wanted = left.min(BLOCK_FACETS) * FACET_BYTES;
-        let got = read_full(&mut input, &mut block[..wanted])?;
-        if got < wanted {
-            let read = (promised as usize - left) * FACET_BYTES + HEADER_BYTES + got;
-            return Err(wrong_length(&input, read as u64, ""));
-        }
-        for facet in block[..wanted].as_chunks::<FACET_BYTES>().0 {
-            push_facet(&mut builder, facet_vertices(facet).map(Vertex::Single));
-        }
-        left -= wanted / FACET_BYTES;
+    if known {
+        builder.reserve_vertices(promised_facets.saturating_mul(3));
+        builder.reserve_triangles(promised_facets);
     }
-    if read_full(&mut input, &mut [0])? > 0 {
-        return Err(wrong_length(&input, binary_bytes(promised), " and more"));
+    while builder.triangle_count() < promised_facets {
+        let block = blocks.peek(FACET_BYTES)?;
+        let facets = block.as_chunks::<FACET_BYTES>().0;
+        let first = builder.triangle_count();
+        let facets = &facets[..facets.len().min(promised_facets - first)];
+        if facets.is_empty() {
+            let rest = block.len() as u64;
+            let length = blocks.position() + rest;
+            return Err(wrong_length(blocks.input(), length, ""));
+        }
+        builder.push_singles(facets.iter().flat_map(facet_vertices));
+        // More than 2^32 vertices are more than `finish` lets pass.
+        let corners = |i: usize| [0, 1, 2].map(|k| (3 * i as u64 + k) as u32);
+        builder.push_triangles((first..first + facets.len()).map(corners));
+        let bytes = facets.len() * FACET_BYTES;
+        blocks.consume(bytes);
+    }
+    if !blocks.peek(1)?.is_empty() {
+        let length = binary_bytes(promised);
+        return Err(wrong_length(blocks.input(), length, " and more"));
     }
     builder.finish()
-}
-
-/// Fills a block as far as the file goes.
-fn read_full(input: &mut Input, block: &mut [u8]) -> Result<usize> {
-    let mut filled = 0;
-    while filled < block.len() {
-        match input.reader.read(&mut block[filled..]) {
-            Ok(0) => break,
-            Ok(n) => filled += n,
-            Err(e) if e.kind() == ErrorKind::Interrupted => {}
-            Err(e) => return Err(input.io_error(e)),
-        }
-    }
-    Ok(filled)
 }
 
 fn facet_vertices(facet: &[u8; FACET_BYTES]) -> [[f32; 3]; 3] {
@@ -125,19 +116,9 @@ fn facet_vertices(facet: &[u8; FACET_BYTES]) -> [[f32; 3]; 3] {
     [3, 6, 9].map(|i| [number(i), number(i + 1), number(i + 2)])
 }
 
-/// A vertex in the precision that the file has.
-#[derive(Clone, Copy)]
-enum Vertex {
-    Single([f32; 3]),
-    Double([f64; 3]),
-}
-
-fn push_facet(builder: &mut MeshBuilder, vertices: [Vertex; 3]) {
-    let indices = vertices.map(|vertex| match vertex {
-        Vertex::Single(position) => builder.push_single(position) as u32,
-        Vertex::Double(position) => builder.push_double(position) as u32,
-    });
-    builder.push_triangle(indices);
+fn push_facet(builder: &mut MeshBuilder, vertices: [[f64; 3]; 3]) {
+    let corners = vertices.map(|position| builder.push_double(position) as u32);
+    builder.push_triangle(corners);
 }
 
 /// Reads ASCII STL by words, so that line breaks do not matter; `solid` and `endsolid` take the
@@ -234,9 +215,9 @@ impl Facet {
         self.numbers.len() < 3 * self.vertices
     }
 
-    fn vertices(&self, lines: &Lines) -> Result<[Vertex; 3]> {
+    fn vertices(&self, lines: &Lines) -> Result<[[f64; 3]; 3]> {
         match self.numbers.as_chunks().0 {
-            &[a, b, c] => Ok([a, b, c].map(Vertex::Double)),
+            &[a, b, c] => Ok([a, b, c]),
             vertices => {
                 let found = format!("a facet with {} vertices", vertices.len());
                 Err(lines.error_at(self.line, &found, "three"))
@@ -306,7 +287,7 @@ mod tests {
         }
     }
 
-    /// 1200 facets are more than one block.
+    /// 12000 facets are more than one block.
     #[test]
     fn binary_is_told_by_its_length() {
         for header in [
@@ -315,10 +296,13 @@ mod tests {
             b"",
             b"OFF",
         ] {
-            let mesh = mesh(binary(header, 1200));
-            assert_eq!(mesh.triangle_count(), 1200);
-            assert_eq!(mesh.positions().len(), 3600);
-            assert_eq!(mesh.positions()[3 * 1199].to_array(), [1199.0, 0.0, 0.0]);
+            let mesh = mesh(binary(header, 12_000));
+            assert_eq!(mesh.triangle_count(), 12_000);
+            assert_eq!(mesh.positions().len(), 36_000);
+            assert_eq!(
+                mesh.positions()[3 * 11_999].to_array(),
+                [11_999.0, 0.0, 0.0]
+            );
         }
     }
 
