@@ -11,7 +11,7 @@ use super::queue::{Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
 use super::surface::{Loss, Merged, Surface};
 use crate::error::{Error, Result};
-use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, VertexId};
+use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +82,12 @@ pub struct Greedy<S: EdgeStore, C: Cost<S>> {
     edges: Vec<EdgeId>,
     /// And their candidates.
     found: Vec<Candidate>,
+    /// Candidates that have been evaluated.
+    ready: Vec<Candidate>,
+    /// The number of collapses when they were.
+    since: u32,
+    /// What the edges cost that were popped last and are to be evaluated.
+    popped_at: f32,
     triangles: usize,
     stop: Stop,
     topology: Topology,
@@ -105,6 +111,9 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             changed: Vec::new(),
             edges: Vec::new(),
             found: Vec::new(),
+            ready: Vec::with_capacity(LANES),
+            since: 0,
+            popped_at: 0.0,
             triangles: surface.triangles(),
             stop: Stop {
                 triangles: 0,
@@ -140,8 +149,10 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                 let begin = block.start + part * PART_FACES;
                 let faces = (begin..block.end.min(begin + PART_FACES)).map(FaceId::new);
                 let mesh = &greedy.surface.mesh;
-                let edges = faces.filter(|&f| mesh.is_live_face(f)).flat_map(FaceId::edges);
-                let names: Vec<EdgeId> = edges.filter(|&e| mesh.canonical(e) == e).collect();
+                let mut names: Vec<EdgeId> = Vec::with_capacity(3 * faces.len());
+                for f in faces.filter(|&f| mesh.is_live_face(f)) {
+                    names.extend(f.edges().into_iter().filter(|&e| mesh.canonical(e) == e));
+                }
                 let mut candidates = Vec::with_capacity(names.len());
                 greedy.evaluate_all(&names, |c| candidates.push(c));
                 candidates.retain(|c| choose(greedy, c));
@@ -197,18 +208,15 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         self.stop = stop;
         let exact_below = self.cost.exact_below();
         self.note_bytes();
-        while self.triangles > stop.triangles {
-            let Some(candidate) = self.queue.pop() else {
-                return Ok(Halt::Empty);
+        let halt = loop {
+            if self.triangles <= stop.triangles {
+                break Halt::Target;
+            }
+            let candidate = match self.next() {
+                Ok(candidate) => candidate,
+                Err(halt) => break halt,
             };
-            if candidate.cost > stop.max_cost {
-                self.queue.push(candidate);
-                return Ok(Halt::Cost(candidate.cost));
-            }
             let e = candidate.edge;
-            if !self.surface.mesh.is_live_face(e.face()) || self.goes_by_another_name(e) {
-                continue;
-            }
             if self
                 .components
                 .last()
@@ -252,18 +260,124 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                     if faces < exact_below && faces_before >= exact_below {
                         self.queue_all(|_, _| true);
                     } else {
+                        if C::IS_LAZY {
+                            self.complete(merged.collapse.kept, candidate.cost);
+                        }
                         self.reconsider();
                     }
                     if self.tally.collapses.is_multiple_of(1024)
                         && progress(self.triangles).is_break()
                     {
-                        return Ok(Halt::Cancelled);
+                        break Halt::Cancelled;
                     }
                 }
             }
+        };
+        while let Some(candidate) = self.ready.pop() {
+            self.queue.push(candidate);
         }
         self.note_bytes();
-        Ok(Halt::Target)
+        Ok(halt)
+    }
+
+    /// The next candidate whose edge is alive and goes by no other name; of lazy costs, one that
+    /// costs as much as it is said to.
+    #[inline]
+    fn next(&mut self) -> std::result::Result<Candidate, Halt> {
+        loop {
+            if let Some(candidate) = self.ready.pop() {
+                if self.is_unchanged(candidate.edge) {
+                    return Ok(candidate);
+                }
+                if self.surface.mesh.is_live_face(candidate.edge.face()) {
+                    self.queue.push(candidate);
+                }
+            }
+            let popped = self.queue.pop();
+            let candidate = match popped {
+                Some(candidate) if candidate.cost <= self.stop.max_cost => candidate,
+                _ => {
+                    popped.into_iter().for_each(|c| self.queue.push(c));
+                    if !self.edges.is_empty() {
+                        self.evaluate_ready();
+                        continue;
+                    }
+                    return Err(popped.map_or(Halt::Empty, |c| Halt::Cost(c.cost)));
+                }
+            };
+            let e = candidate.edge;
+            if !self.surface.mesh.is_live_face(e.face()) || self.goes_by_another_name(e) {
+                continue;
+            }
+            if !C::IS_LAZY {
+                return Ok(candidate);
+            }
+            self.edges.push(e);
+            self.popped_at = candidate.cost;
+            if self.edges.len() == LANES || !self.queue.has_at_most(candidate.cost) {
+                self.evaluate_ready();
+            }
+        }
+    }
+
+    /// Evaluates the edges that were popped: those that cost as much are ready, the others go back.
+    #[inline]
+    fn evaluate_ready(&mut self) {
+        let cost = self.popped_at;
+        let mut edges = std::mem::take(&mut self.edges);
+        let mut found = std::mem::take(&mut self.found);
+        self.evaluate_all(&edges, |candidate| found.push(candidate));
+        for candidate in found.drain(..) {
+            if candidate.cost > cost * RISE {
+                self.queue.push(candidate);
+            } else {
+                let edge = candidate.edge;
+                self.ready.push(Candidate { cost, edge });
+            }
+        }
+        edges.clear();
+        self.since = self.tally.collapses as u32;
+        (self.edges, self.found) = (edges, found);
+    }
+
+    /// Whether nothing has changed at either end since the edges that are ready were evaluated.
+    #[inline]
+    fn is_unchanged(&self, e: EdgeId) -> bool {
+        let mesh = &self.surface.mesh;
+        let is_before = |v: VertexId| self.changed_at[v.index()] <= self.since;
+        mesh.is_live_face(e.face()) && mesh.edge_vertices(e).into_iter().all(is_before)
+    }
+
+    /// Queues the edges at a merged vertex that have no candidate, at the cost of now, which is a
+    /// lower bound.
+    #[inline]
+    fn complete(&mut self, v: VertexId, cost: f32) {
+        self.changed_at[v.index()] = self.tally.collapses as u32;
+        let mut edges = std::mem::take(&mut self.edges);
+        let mesh = &self.surface.mesh;
+        for start in mesh.fans(v) {
+            let mut end = None;
+            for e in mesh.fan(start) {
+                let before = mesh.prev(e);
+                let is_queued = match mesh.opposite(e) {
+                    Opposite::Edge(o) => self.queue.contains(e) || self.queue.contains(o),
+                    Opposite::Boundary => self.queue.contains(e),
+                    Opposite::NonManifold(_) => self.queue.contains(mesh.canonical(e)),
+                };
+                if !is_queued {
+                    edges.push(mesh.canonical(e));
+                }
+                end = Some(before);
+            }
+            let end = end.filter(|&end| mesh.mate(end).is_none());
+            edges.extend(end.map(|end| mesh.canonical(end)).filter(|&e| !self.queue.contains(e)));
+        }
+        for edge in edges.drain(..) {
+            if self.surface.held(edge) != [true; 2] {
+                self.queue.push(Candidate { cost, edge });
+            }
+        }
+        self.edges = edges;
     }
 
     /// What was counted so far.
@@ -520,25 +634,21 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
 
     /// Evaluates the edges at the changed vertices, each once.
     fn reconsider(&mut self) {
+        if self.changed.is_empty() {
+            return;
+        }
         let mut edges = std::mem::take(&mut self.edges);
         edges.clear();
         let now = self.tally.collapses as u32;
-        let is_one = self.changed.len() == 1;
-        if !is_one {
-            for &v in &self.changed {
-                self.changed_at[v.index()] = now;
-            }
+        for &v in &self.changed {
+            self.changed_at[v.index()] = now;
         }
         let mesh = &self.surface.mesh;
         for &v in &self.changed {
             for start in mesh.fans(v) {
                 let mut end = None;
                 for e in mesh.fan(start) {
-                    if is_one && mesh.mate(e).is_some() {
-                        edges.push(mesh.canonical(e));
-                    } else {
-                        edges.extend(self.name_at(v, mesh.head(e), e, now));
-                    }
+                    edges.extend(self.name_at(v, mesh.head(e), e, now));
                     end = Some(mesh.prev(e)).filter(|&before| mesh.mate(before).is_none());
                 }
                 if let Some(end) = end {
@@ -549,8 +659,8 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         let mut found = std::mem::take(&mut self.found);
         self.evaluate_all(&edges, |candidate| found.push(candidate));
         found.drain(..).for_each(|candidate| self.queue.push(candidate));
-        self.found = found;
-        self.edges = edges;
+        edges.clear();
+        (self.edges, self.found) = (edges, found);
     }
 
     /// The name of the edge from the changed vertex `v` to `other`, unless it is `other`'s turn (both

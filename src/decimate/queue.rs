@@ -25,6 +25,9 @@ pub trait Queue: Send + Sync {
     /// Takes the cheapest candidate out; its cost may be given as a little more than it was.
     fn pop(&mut self) -> Option<Candidate>;
 
+    /// Whether there may be one that costs no more than this.
+    fn has_at_most(&self, cost: f32) -> bool;
+
     /// Whether a candidate goes by this directed edge.
     fn contains(&self, e: EdgeId) -> bool;
 
@@ -93,6 +96,10 @@ impl Queue for LazyHeap {
                 });
             }
         }
+    }
+
+    fn has_at_most(&self, cost: f32) -> bool {
+        self.heap.peek().is_some_and(|&(bits, _)| f32::from_bits(bits) <= cost)
     }
 
     fn contains(&self, e: EdgeId) -> bool {
@@ -219,6 +226,12 @@ impl Queue for Buckets {
             cost: ceiling(self.lowest),
             edge: EdgeId::new(e as usize),
         })
+    }
+
+    #[inline]
+    fn has_at_most(&self, cost: f32) -> bool {
+        let bucket = bucket_of(cost);
+        self.lowest < bucket || self.first[bucket] != NONE
     }
 
     #[inline]

@@ -71,7 +71,35 @@ pub struct Accumulated {
     placement: Placement,
 }
 
+/// The coordinates of vertices.
+#[inline(always)]
+fn places<S: EdgeStore>(surface: &Surface<S>, vertices: &[VertexId; LANES]) -> [f32x4; 3] {
+    let place = |v| {
+        let [x, y, z] = surface.geometry.position(v).to_array();
+        f32x4::new([x, y, z, 0.0])
+    };
+    let [x, y, z, _] = f32x4::transpose(vertices.map(place));
+    [x, y, z]
+}
+
+impl Accumulated {
+    /// The numbers of vertices' quadrics.
+    #[inline(always)]
+    fn numbers(&self, vertices: &[VertexId; LANES]) -> [f32x4; 10] {
+        let quadrics = vertices.map(|v| &self.quadrics[v.index()].0);
+        let [first, second, third] = [0, 4, 6].map(|i| {
+            let part = |q: &[f32; 10]| f32x4::new(*q[i..].first_chunk().expect("ten numbers"));
+            f32x4::transpose(quadrics.map(part))
+        });
+        let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (first, second, third);
+        [a, b, c, d, e, f, g, h, i, j]
+    }
+}
+
 impl<S: EdgeStore> Cost<S> for Accumulated {
+    /// Costs only grow: what an edge cost once is a lower bound.
+    const IS_LAZY: bool = true;
+
     type Queue = Buckets;
     type State = Quadric;
 
@@ -161,23 +189,16 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
         let ends = edges.map(|e| surface.mesh.edge_vertices(e));
-        let at = |end: usize| {
-            let positions = ends.map(|ends| surface.geometry.position(ends[end]));
-            let [x, y, z, _] = f32x4::transpose(positions.map(|p| f32x4::new([p.x, p.y, p.z, 0.0])));
-            [x, y, z]
-        };
-        let (from, to) = (at(0), at(1));
+        let (tails, heads) = (ends.map(|[v, _]| v), ends.map(|[_, w]| w));
+        let (from, to) = (places(surface, &tails), places(surface, &heads));
         let scale = f32x4::splat(surface.geometry.scale() as f32);
         let along = std::array::from_fn(|i| (to[i] - from[i]) * scale);
-        let numbers = |end: usize| {
-            let quadrics = ends.map(|ends| &self.quadrics[ends[end].index()].0);
-            let part = |i: usize| {
-                f32x4::transpose(quadrics.map(|q| f32x4::new([q[i], q[i + 1], q[i + 2], q[i + 3]])))
-            };
-            let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (part(0), part(4), part(6));
-            [a, b, c, d, e, f, g, h, i, j]
-        };
-        let least = least(&numbers(0), &numbers(1), along, self.placement);
+        let least = least(
+            &self.numbers(&tails),
+            &self.numbers(&heads),
+            along,
+            self.placement,
+        );
         let at_end = Number::choose(least.head_is_better, least.at_head, least.at_tail);
         let energy = Number::choose(least.x_is_better, least.at_x, at_end);
         let energy = Number::choose(energy.greater(f32x4::ZERO), energy, f32x4::ZERO);
@@ -202,7 +223,6 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         let (a, b, c) = sum.expect("two ends");
         self.quadrics[kept.index()] = Quadric::new(a, b, c.max(0.0));
         changed.clear();
-        changed.push(kept);
     }
 
     fn after_change(

@@ -187,6 +187,8 @@ fn add_fold(quadratic: &mut Symmetric, along: DVec3, a: Side, b: Side, is_crease
 }
 
 impl<S: EdgeStore> Cost<S> for Memoryless {
+    const IS_LAZY: bool = false;
+
     type Queue = Buckets;
     type State = ();
 

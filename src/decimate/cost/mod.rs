@@ -28,6 +28,10 @@ pub struct Evaluation {
 
 /// A cost model: owns its state and follows the collapses.
 pub trait Cost<S: EdgeStore>: Send + Sync {
+    /// Whether candidates are evaluated when they are popped, four at a time, and only the edges
+    /// that have none after a collapse become candidates again: for costs that never fall.
+    const IS_LAZY: bool;
+
     /// What keeps the candidates in order.
     type Queue: Queue;
 
