@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use decimate::decimate::{Boundary, Options, Placement, Quality, Targets, TierChoice, Topology};
+use decimate::decimate::{
+    Boundary, Chunks, Options, Placement, Quality, Targets, TierChoice, Topology,
+};
 use decimate::io::Format;
 use decimate::mesh::Tier;
 
@@ -156,6 +158,10 @@ pub struct Run {
     /// The threads to use; all processors where not given. The output does not depend on it.
     #[arg(long, value_name = "N", help_heading = "Resources")]
     pub threads: Option<usize>,
+    /// Decimate pieces of the mesh on their own first: auto where that is quicker, off, or pieces of
+    /// about so many triangles. Changes the result a little.
+    #[arg(long, value_name = "auto|off|TRIANGLES", default_value = "auto", value_parser = parse_chunks, help_heading = "Resources")]
+    pub chunks: Chunks,
 
     /// The input's format, where neither content nor extension says it.
     #[arg(long, value_name = "FORMAT", help_heading = "Files")]
@@ -277,10 +283,23 @@ impl Run {
                 TierArg::Medium => TierChoice::Fixed(Tier::Medium),
                 TierArg::Small => TierChoice::Fixed(Tier::Small),
             },
+            chunks: self.chunks,
             memory_limit_bytes: self.memory_limit,
             weld: !self.no_weld,
             check: self.check,
         }
+    }
+}
+
+/// `auto`, `off` or a number of triangles.
+fn parse_chunks(text: &str) -> Result<Chunks, String> {
+    match text {
+        "auto" => Ok(Chunks::Auto),
+        "off" => Ok(Chunks::Off),
+        _ => match text.parse() {
+            Ok(triangles) if triangles > 0 => Ok(Chunks::Triangles(triangles)),
+            _ => Err("auto, off or a number of triangles is expected".into()),
+        },
     }
 }
 

@@ -10,7 +10,7 @@
 //! The cut depends on the mesh alone and the chunks do not know each other, so the result does not
 //! depend on the number of threads.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -19,14 +19,26 @@ use super::cost::Cost;
 use super::cut::Cut;
 use super::flat::{FaceFlags, Flat};
 use super::greedy::{Greedy, Halt, Stop};
-use super::options::{Options, Topology};
+use super::options::{Chunks, Options, Topology};
+use super::queue::Buckets;
 use super::report::Tally;
-use crate::error::Result;
 use super::surface::Surface;
+use crate::error::Result;
 use crate::mesh::{EdgeStore, FaceId, Mesh, Outgoing, VertexId};
 
 /// Below so many faces the whole mesh is as quick.
-pub const CHUNKED_ABOVE: usize = 50_000;
+const WORTHWHILE_FACES: usize = 50_000;
+
+/// The vertices of a chunk, at least and at most. A chunk's mesh and all that goes with it then take
+/// half a megabyte to one, which is what the second cache of a processor holds.
+const CHUNK_VERTICES: Range<usize> = 2048..4096;
+
+/// Where chunks are asked for, the mesh has so many times as many faces at least.
+const SEVERAL: usize = 4;
+
+/// Where more than this share of the faces in the pilot's chunks meet a neighbour that runs the other
+/// way round, the whole is oriented first.
+const DISORIENTED: f64 = 0.005;
 
 /// Chunks stop above the target by this factor: what is left is for the loop over the whole mesh,
 /// which needs room to choose.
@@ -74,32 +86,58 @@ pub struct Done {
     pub rounds: usize,
     /// Non-manifold edges of the input.
     pub non_manifold_edges_in: usize,
+    /// Whether nothing was done, since the faces do not agree with their neighbours.
+    pub is_disoriented: bool,
     /// Whether the caller asked to stop.
     pub is_cancelled: bool,
 }
 
 impl Chunked<'_> {
+    /// The least number of faces that is decimated in chunks, and the vertices of a chunk.
+    fn sizes(&self) -> Option<(usize, Range<usize>)> {
+        match self.options.chunks {
+            Chunks::Off => None,
+            Chunks::Auto => Some((WORTHWHILE_FACES, CHUNK_VERTICES)),
+            Chunks::Triangles(triangles) => {
+                let most = (triangles / 2).max(2);
+                Some((SEVERAL * triangles, most / 2..most))
+            }
+        }
+    }
+
+    /// The density to which chunks would bring a mesh, if that is worth it.
+    fn density<V>(&self, flat: &Flat<V>) -> Option<(f64, Range<usize>)> {
+        let (least_faces, chunk_vertices) = self.sizes()?;
+        let least = ABOVE_TARGET * self.stop.triangles as f64;
+        let density = (least / flat.triangle_count() as f64).max(LEAST_DENSITY);
+        (flat.triangles.len() >= least_faces && density <= WORTHWHILE)
+            .then_some((density, chunk_vertices))
+    }
+
+    /// Whether chunks are worth it.
+    pub fn is_worthwhile<V>(&self, flat: &Flat<V>) -> bool {
+        self.density(flat).is_some()
+    }
+
     /// Decimates towards the target, not below it; as far as it is worth it.
     ///
     /// # Errors
     /// As [`Greedy::advance`].
     pub fn reduce<S: EdgeStore, C: Cost<S>>(&mut self, flat: &mut Flat<C::State>) -> Result<Done> {
         let mut done = Done::default();
-        let least = ABOVE_TARGET * self.stop.triangles as f64;
-        loop {
+        while let Some((density, chunk_vertices)) = self.density(flat) {
             let faces = flat.triangle_count();
-            let density = (least / faces as f64).max(LEAST_DENSITY);
-            if flat.triangles.len() < CHUNKED_ABOVE || density > WORTHWHILE || done.is_cancelled {
-                return Ok(done);
+            let until = Until::Density(density);
+            let max_cost = self.round::<S, C>(flat, until, &chunk_vertices, &mut done)?;
+            if done.is_cancelled || done.is_disoriented {
+                break;
             }
-            let max_cost = self.round::<S, C>(flat, Until::Density(density), &mut done)?;
-            if !done.is_cancelled {
-                self.round::<S, C>(flat, Until::Cost(max_cost), &mut done)?;
-            }
-            if flat.triangle_count() as f64 > WORTHWHILE * faces as f64 {
-                return Ok(done);
+            self.round::<S, C>(flat, Until::Cost(max_cost), &chunk_vertices, &mut done)?;
+            if done.is_cancelled || flat.triangle_count() as f64 > WORTHWHILE * faces as f64 {
+                break;
             }
         }
+        Ok(done)
     }
 
     /// Cuts, decimates every chunk, and puts the results together. The threshold.
@@ -107,12 +145,16 @@ impl Chunked<'_> {
         &mut self,
         flat: &mut Flat<C::State>,
         until: Until,
+        chunk_vertices: &Range<usize>,
         done: &mut Done,
     ) -> Result<f32> {
         let is_first = done.rounds == 0;
-        let cut = Cut::new(flat, if done.rounds.is_multiple_of(2) { 0.0 } else { SHIFT });
-        done.rounds += 1;
-        done.chunks += cut.len();
+        let shift = if done.rounds.is_multiple_of(2) {
+            0.0
+        } else {
+            SHIFT
+        };
+        let cut = Cut::new(flat, shift, chunk_vertices);
         let mut triangles = flat.triangle_count();
         let mut outcomes: Vec<Option<Outcome<C::State>>> = Vec::new();
         outcomes.resize_with(cut.len(), || None);
@@ -123,6 +165,12 @@ impl Chunked<'_> {
             Until::Density(density) => {
                 let pilots = pilots(cut.len());
                 let mut chunks: Vec<_> = pilots.par_iter().map(|&k| begin(k)).collect();
+                let faces: usize = chunks.iter().map(|c| c.greedy.triangles()).sum();
+                let conflicts: usize = chunks.iter().map(|c| c.singular.conflicts).sum();
+                if conflicts as f64 > DISORIENTED * faces as f64 {
+                    done.is_disoriented = true;
+                    return Ok(0.0);
+                }
                 let budget = triangles.saturating_sub(self.stop.triangles);
                 let max_cost = self.advance_together(&mut chunks, density, budget)?;
                 let ended: Vec<_> = chunks.into_par_iter().map(Chunk::end).collect();
@@ -133,6 +181,8 @@ impl Chunked<'_> {
                 max_cost
             }
         };
+        done.rounds += 1;
+        done.chunks += cut.len();
         let rest: Vec<usize> = (0..cut.len()).filter(|&k| outcomes[k].is_none()).collect();
         let mut rest = &rest[..];
         while !rest.is_empty() && !done.is_cancelled {
@@ -217,13 +267,17 @@ enum Until {
 
 /// Which chunks find the threshold, spread evenly over all.
 fn pilots(chunks: usize) -> Vec<usize> {
-    let count = ((PILOT_SHARE * chunks as f64).ceil() as usize).max(PILOT_CHUNKS).min(chunks);
-    (0..count).map(|i| (2 * i + 1) * chunks / (2 * count)).collect()
+    let count = ((PILOT_SHARE * chunks as f64).ceil() as usize)
+        .max(PILOT_CHUNKS)
+        .min(chunks);
+    (0..count)
+        .map(|i| (2 * i + 1) * chunks / (2 * count))
+        .collect()
 }
 
 /// A piece of the surface and its mesh.
 struct Chunk<S: EdgeStore, C: Cost<S>> {
-    greedy: Greedy<S, C>,
+    greedy: Greedy<S, C, Buckets>,
     /// The vertices by their numbers in the whole: those of the chunk, then others.
     vertices: Vec<u32>,
     /// The chunk's own vertices.
@@ -267,6 +321,8 @@ struct Singular {
     rim: Vec<RimEdge>,
     /// Non-manifold edges that are not on the seam.
     non_manifold_edges: usize,
+    /// Of these, the ones at which two neighbours do not agree.
+    conflicts: usize,
 }
 
 /// An edge between two vertices on the seam by their numbers in the whole, the smaller first, and
@@ -312,11 +368,14 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             weights: gather(&flat.weights, &vertices),
             deviation: gather(&flat.deviation, &vertices),
             states: gather(&flat.states, &vertices),
+            creased: flat.creased,
             flags: if flat.flags.is_empty() {
                 Vec::new()
             } else {
                 let ranges = cut.faces(chunk);
-                ranges.flat_map(|range| flat.flags[range].iter().copied()).collect()
+                ranges
+                    .flat_map(|range| flat.flags[range].iter().copied())
+                    .collect()
             },
             triangles: Vec::new(),
         };
@@ -329,7 +388,10 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         let (cost, singular) = if is_first {
             (C::new(&surface, options), singular(&surface, &vertices))
         } else {
-            (C::with_states(&surface, options, states), Singular::default())
+            (
+                C::with_states(&surface, options, states),
+                Singular::default(),
+            )
         };
         // Neighbours that do not agree wait until the whole is oriented.
         for e in surface.mesh.same_way_pairs() {
@@ -367,7 +429,10 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         let mesh = &surface.mesh;
         let number = |v: VertexId| self.vertices[v.index()];
         let mut outcome = Outcome {
-            triangles: mesh.faces().map(|f| mesh.face_vertices(f).map(number)).collect(),
+            triangles: mesh
+                .faces()
+                .map(|f| mesh.face_vertices(f).map(number))
+                .collect(),
             flags: Vec::new(),
             kept: Vec::with_capacity(self.inner - tally.collapses),
             held: Vec::new(),
@@ -407,12 +472,17 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
 fn singular<S: EdgeStore>(surface: &Surface<S>, vertices: &[u32]) -> Singular {
     let mesh = &surface.mesh;
     let mut singular = Singular::default();
-    for e in mesh.faces().flat_map(FaceId::edges).filter(|&e| mesh.mate(e).is_none()) {
+    for e in mesh
+        .faces()
+        .flat_map(FaceId::edges)
+        .filter(|&e| mesh.mate(e).is_none())
+    {
         if surface.is_rim(e) {
             let [a, b] = mesh.edge_vertices(e).map(|v| vertices[v.index()]);
             singular.rim.push((a.min(b), a.max(b), a < b));
         } else if !mesh.is_boundary(e) && mesh.canonical(e) == e {
             singular.non_manifold_edges += 1;
+            singular.conflicts += usize::from(mesh.edge_star(e).len() == 2);
         }
     }
     singular
@@ -437,7 +507,10 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     rim.par_sort_unstable();
     let edges = || rim.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
     let is_singular = |edge: &&[RimEdge]| !matches!(edge, [a, b] if a.2 != b.2);
-    non_manifold_edges += edges().filter(is_singular).filter(|edge| edge.len() > 1).count();
+    non_manifold_edges += edges()
+        .filter(is_singular)
+        .filter(|edge| edge.len() > 1)
+        .count();
 
     let mut alive = vec![true; flat.positions.len()];
     flat.deviation.resize(flat.positions.len(), 0.0);
@@ -479,13 +552,21 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
             next.wrapping_sub(1)
         })
         .collect();
-    triangles.par_iter_mut().flatten().for_each(|v| *v = renamed[*v as usize]);
+    triangles
+        .par_iter_mut()
+        .flatten()
+        .for_each(|v| *v = renamed[*v as usize]);
     let lines: Vec<(u32, C::State)> = edges()
         .filter(is_singular)
         .flat_map(|edge| {
             let [a, b] = [edge[0].0, edge[0].1];
             let [p, q] = [a, b].map(|v| flat.positions[v as usize].as_dvec3() * scale);
-            [a, b].map(|v| (renamed[v as usize], C::line(options, q - p, edge.len() == 1)))
+            [a, b].map(|v| {
+                (
+                    renamed[v as usize],
+                    C::line(options, q - p, edge.len() == 1),
+                )
+            })
         })
         .collect();
     retain(&mut flat.positions, &alive);

@@ -9,10 +9,6 @@ use rayon::prelude::*;
 use super::flat::Flat;
 use crate::spatial::Grid;
 
-/// The vertices of a chunk, at least and at most. A chunk's mesh and all that goes with it then
-/// take half a megabyte to one.
-const CHUNK_VERTICES: Range<usize> = 2048..4096;
-
 /// A chunk ends at a multiple of this.
 const GROUP: usize = 64;
 
@@ -37,10 +33,14 @@ pub struct Cut {
 
 impl Cut {
     /// Sorts the vertices by the Morton order of a grid shifted by so much of the box, and the faces,
-    /// block by block, by chunk.
+    /// block by block, by chunk. A chunk has so many vertices, at least and at most.
     ///
     /// Takes 30 bytes a vertex while it runs, 2 a vertex after.
-    pub fn new<V: Clone + Send + Sync>(flat: &mut Flat<V>, shift: f32) -> Self {
+    pub fn new<V: Clone + Send + Sync>(
+        flat: &mut Flat<V>,
+        shift: f32,
+        chunk_vertices: &Range<usize>,
+    ) -> Self {
         let grid = Grid::over(&flat.positions, shift);
         let order = grid.order(&flat.positions);
         permute(&mut flat.positions, &order);
@@ -53,7 +53,7 @@ impl Cut {
             renamed[old as usize] = new as u32;
         }
         drop(order);
-        let begins = cuts(&flat.positions, &grid);
+        let begins = cuts(&flat.positions, &grid, chunk_vertices);
         let mut cut = Self {
             chunk_of_group: Vec::with_capacity(renamed.len().div_ceil(GROUP)),
             block_faces: flat.triangles.len().div_ceil(MOST_BLOCKS).max(BLOCK_FACES),
@@ -65,7 +65,8 @@ impl Cut {
             let groups = (range[1] as usize).div_ceil(GROUP);
             cut.chunk_of_group.resize(groups, chunk as u32);
         }
-        cut.shared.resize_with(renamed.len(), || AtomicBool::new(false));
+        cut.shared
+            .resize_with(renamed.len(), || AtomicBool::new(false));
         let has_flags = !flat.flags.is_empty();
         let (begins, orders) = flat
             .triangles
@@ -158,14 +159,14 @@ impl Cut {
 
 /// Where chunks begin and end: within the bounds of their size, where the largest cubes of the grid
 /// meet.
-fn cuts(positions: &[Vec3], grid: &Grid) -> Vec<u32> {
+fn cuts(positions: &[Vec3], grid: &Grid, chunk_vertices: &Range<usize>) -> Vec<u32> {
     let mut begins = vec![0];
     let mut begin = 0;
-    while positions.len() - begin > CHUNK_VERTICES.end {
-        let first = (begin + CHUNK_VERTICES.start).next_multiple_of(GROUP);
-        let last = begin + CHUNK_VERTICES.end;
+    while positions.len() - begin > chunk_vertices.end {
+        let first = begin + chunk_vertices.start.next_multiple_of(GROUP);
+        let last = begin + chunk_vertices.end.next_multiple_of(GROUP);
         let step_at = |&at: &usize| grid.code(positions[at - 1]) ^ grid.code(positions[at]);
-        let ends = (first..=last).step_by(GROUP);
+        let ends = (first..=last.min(positions.len() - 1)).step_by(GROUP);
         let end = ends.max_by_key(step_at).expect("more than one group");
         begins.push(end as u32);
         begin = end;
@@ -197,20 +198,21 @@ mod tests {
             ..Flat::default()
         };
         let corners = |flat: &Flat<()>| {
-            let at = |t: &[u32; 3]| t.map(|v| flat.positions[v as usize].to_array().map(f32::to_bits));
+            let at =
+                |t: &[u32; 3]| t.map(|v| flat.positions[v as usize].to_array().map(f32::to_bits));
             let mut corners: Vec<_> = flat.triangles.iter().map(at).collect();
             corners.sort_unstable();
             corners
         };
         let before = corners(&flat);
-        let cut = Cut::new(&mut flat, 0.3);
+        let cut = Cut::new(&mut flat, 0.3, &(2048..4096));
         assert_eq!(corners(&flat), before);
         assert!(cut.len() > 5);
         let mut seen = vec![0; flat.triangles.len()];
         let mut shared = vec![false; flat.positions.len()];
         for chunk in 0..cut.len() {
             let vertices = cut.vertices(chunk);
-            assert!(vertices.len() <= CHUNK_VERTICES.end);
+            assert!(vertices.len() <= 4096);
             for f in cut.faces(chunk).flatten() {
                 seen[f] += 1;
                 let inside = |v: &u32| vertices.contains(&(*v as usize));

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::geometry::Geometry;
 use super::surface::Surface;
 use crate::indexed_mesh::Parts;
-use crate::mesh::{EdgeStore, FaceId, Mesh};
+use crate::mesh::{Compaction, EdgeStore, FaceId, Mesh};
 
 /// What is known of a face beside its vertices, in one byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +20,11 @@ impl FaceFlags {
     /// Whether the face counts as two.
     pub fn is_double_sided(self) -> bool {
         self.0 & Self::DOUBLE_SIDED != 0
+    }
+
+    /// Whether the face was turned round to agree with its neighbours.
+    pub fn is_turned(self) -> bool {
+        self.0 & Self::TURNED != 0
     }
 }
 
@@ -41,6 +46,8 @@ pub struct Flat<V> {
     pub states: Vec<V>,
     /// What is known of the faces.
     pub flags: Vec<FaceFlags>,
+    /// Whether creases are kept, though there may be none.
+    pub creased: bool,
 }
 
 /// The largest weight, relative to the middle one: large enough to leave a vertex for the last, and
@@ -59,6 +66,7 @@ impl<V> Flat<V> {
             deviation: Vec::new(),
             states: Vec::new(),
             flags,
+            creased: false,
         };
         flat.weigh(parts.weights);
         flat
@@ -120,8 +128,8 @@ impl<V> Flat<V> {
             if flags.get(i) == Some(&true) { bit } else { 0 }
         };
         let flags = |f| {
-            let of_face = flag(double_sided, f, FaceFlags::DOUBLE_SIDED)
-                | flag(turned, f, FaceFlags::TURNED);
+            let of_face =
+                flag(double_sided, f, FaceFlags::DOUBLE_SIDED) | flag(turned, f, FaceFlags::TURNED);
             (0..3).fold(of_face, |bits, k| {
                 bits | flag(creases, 3 * f + k, FaceFlags::CREASE << k)
             })
@@ -129,42 +137,46 @@ impl<V> Flat<V> {
         (0..faces).map(|f| FaceFlags(flags(f))).collect()
     }
 
-    /// One flag a face or directed edge: which of them has a bit; nothing where none has.
-    fn unpacked(flags: &[FaceFlags], bits: &[u8]) -> Vec<bool> {
-        let any = bits.iter().fold(0, |all, bit| all | bit);
-        if flags.iter().all(|f| f.0 & any == 0) {
+    /// One flag a face or directed edge: which of them has a bit; nothing where none has, unless all
+    /// are wanted.
+    fn unpacked(&self, faces: usize, bits: &[u8], all: bool) -> Vec<bool> {
+        let any = bits.iter().fold(0, |any, bit| any | bit);
+        if !all && self.flags.iter().all(|f| f.0 & any == 0) {
             return Vec::new();
         }
         let of_face = |f: &FaceFlags| {
             let f = *f;
             bits.iter().map(move |bit| f.0 & bit != 0)
         };
-        flags.iter().flat_map(of_face).collect()
+        let mut unpacked: Vec<bool> = self.flags.iter().flat_map(of_face).collect();
+        unpacked.resize(bits.len() * faces, false);
+        unpacked
     }
 
     /// The surface of these arrays over a mesh built from their triangles, and the states.
     ///
-    /// `scale` is the one of the whole. `turned` says which faces were turned round for the mesh.
+    /// `scale` is the one of the whole. `turned` says which faces were turned round for the mesh. A
+    /// turned face must have no crease.
     pub fn into_surface<S: EdgeStore>(
         self,
         mesh: Mesh<S>,
         scale: f64,
         turned: &[bool],
     ) -> (Surface<S>, Vec<V>) {
-        let mut was_turned = Self::unpacked(&self.flags, &[FaceFlags::TURNED]);
-        if !turned.is_empty() {
-            was_turned.resize(self.triangles.len(), false);
-            for (was, now) in was_turned.iter_mut().zip(turned) {
-                *was ^= now;
-            }
+        let faces = mesh.face_slots();
+        let mut was_turned = self.unpacked(faces, &[FaceFlags::TURNED], !turned.is_empty());
+        for (was, now) in was_turned.iter_mut().zip(turned) {
+            *was ^= now;
         }
         let [a, b, c] = [0, 1, 2].map(|k| FaceFlags::CREASE << k);
+        let creases = self.unpacked(faces, &[a, b, c], self.creased);
+        let double_sided = self.unpacked(faces, &[FaceFlags::DOUBLE_SIDED], false);
         let mut deviation = self.deviation;
         deviation.resize(mesh.vertex_slots(), 0.0);
         let surface = Surface {
             locked: self.locked,
-            double_sided: Self::unpacked(&self.flags, &[FaceFlags::DOUBLE_SIDED]),
-            creases: Self::unpacked(&self.flags, &[a, b, c]),
+            double_sided,
+            creases,
             weights: self.weights,
             deviation,
             lost: 0.0,
@@ -185,9 +197,46 @@ impl<S: EdgeStore> Surface<S> {
         };
         let of_face = flag(&self.double_sided, f.index(), FaceFlags::DOUBLE_SIDED)
             | flag(&self.turned, f.index(), FaceFlags::TURNED);
-        let bits = f.edges().into_iter().enumerate().fold(of_face, |bits, (k, e)| {
-            bits | flag(&self.creases, e.index(), FaceFlags::CREASE << k)
-        });
+        let bits = f
+            .edges()
+            .into_iter()
+            .enumerate()
+            .fold(of_face, |bits, (k, e)| {
+                bits | flag(&self.creases, e.index(), FaceFlags::CREASE << k)
+            });
         FaceFlags(bits)
+    }
+    /// The arrays of what is left.
+    pub fn into_flat<V>(self) -> Flat<V> {
+        let flags = if self.has_flags() {
+            self.mesh.faces().map(|f| self.flags(f)).collect()
+        } else {
+            Vec::new()
+        };
+        let creased = !self.creases.is_empty();
+        let Self {
+            mut mesh,
+            geometry,
+            mut locked,
+            mut weights,
+            mut deviation,
+            ..
+        } = self;
+        let vertices = mesh.compact().vertices;
+        let mut positions = geometry.into_positions();
+        Compaction::retain(&vertices, &mut positions);
+        Compaction::retain(&vertices, &mut locked);
+        Compaction::retain(&vertices, &mut weights);
+        Compaction::retain(&vertices, &mut deviation);
+        Flat {
+            positions,
+            triangles: mesh.triangles(),
+            locked,
+            weights,
+            deviation,
+            states: Vec::new(),
+            flags,
+            creased,
+        }
     }
 }

@@ -70,10 +70,10 @@ struct Component {
 }
 
 /// A surface being decimated under one cost.
-pub struct Greedy<S: EdgeStore, C: Cost<S>> {
+pub struct Greedy<S, C, Q> {
     surface: Surface<S>,
     cost: C,
-    queue: C::Queue,
+    queue: Q,
     /// The number of collapses before each vertex's surroundings last changed.
     changed_at: Vec<u32>,
     /// The vertices whose surroundings changed last; kept for its memory.
@@ -101,12 +101,12 @@ pub struct Greedy<S: EdgeStore, C: Cost<S>> {
     tally: Tally,
 }
 
-impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
+impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     /// Evaluates every edge, in parallel. Counting goes on from `tally`.
     pub fn new(surface: Surface<S>, cost: C, topology: Topology, tally: Tally) -> Self {
         let mut greedy = Self {
             cost,
-            queue: C::Queue::for_edges(3 * surface.mesh.face_slots()),
+            queue: Q::for_edges(3 * surface.mesh.face_slots()),
             changed_at: vec![0; surface.mesh.vertex_slots()],
             changed: Vec::new(),
             edges: Vec::new(),
@@ -370,7 +370,10 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                 end = Some(before);
             }
             let end = end.filter(|&end| mesh.mate(end).is_none());
-            edges.extend(end.map(|end| mesh.canonical(end)).filter(|&e| !self.queue.contains(e)));
+            edges.extend(
+                end.map(|end| mesh.canonical(end))
+                    .filter(|&e| !self.queue.contains(e)),
+            );
         }
         for edge in edges.drain(..) {
             if self.surface.held(edge) != [true; 2] {
@@ -421,7 +424,10 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
                 [true, true] => give(e, f32::NAN),
                 held => {
                     let evaluation = self.cost.evaluate(&self.surface, e, held);
-                    give(e, evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32));
+                    give(
+                        e,
+                        evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32),
+                    );
                 }
             }
             if count == LANES {
@@ -483,7 +489,11 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
             .surface
             .deviation_after(e, position)
             .ok_or(Rejection::Flip)?;
-        if self.stop.max_error.is_some_and(|limit| f64::from(deviation) > limit) {
+        if self
+            .stop
+            .max_error
+            .is_some_and(|limit| f64::from(deviation) > limit)
+        {
             Err(Rejection::Error)
         } else {
             Ok((way, deviation))
@@ -658,7 +668,9 @@ impl<S: EdgeStore, C: Cost<S>> Greedy<S, C> {
         }
         let mut found = std::mem::take(&mut self.found);
         self.evaluate_all(&edges, |candidate| found.push(candidate));
-        found.drain(..).for_each(|candidate| self.queue.push(candidate));
+        found
+            .drain(..)
+            .for_each(|candidate| self.queue.push(candidate));
         edges.clear();
         (self.edges, self.found) = (edges, found);
     }

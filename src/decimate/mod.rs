@@ -19,13 +19,15 @@ mod symmetric;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use glam::Vec3;
+
 use crate::clean::{Cleaning, clean};
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
-use crate::mesh::{Compaction, EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
+use crate::mesh::{EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
-pub use options::{Boundary, Options, Placement, Quality, Targets, TierChoice, Topology};
+pub use options::{Boundary, Chunks, Options, Placement, Quality, Targets, TierChoice, Topology};
 pub use report::{Blocked, Report, StopReason, Tally};
 
 use chunked::Chunked;
@@ -151,6 +153,14 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let parts = input.into_parts();
     let origin = parts.origin;
     let mut flat = Flat::<C::State>::of(parts);
+    // Single precision has room for lengths like these and their fourth powers.
+    let unit = if (MODERATE.recip()..=MODERATE).contains(&scale) {
+        1.0
+    } else {
+        scale
+    };
+    rescale(&mut flat.positions, unit);
+    let scale_of_unit = scale / unit;
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),
@@ -169,44 +179,64 @@ fn run<S: EdgeStore, C: Cost<S>>(
             })
         },
     };
-    if options.quality != Quality::Best {
-        let mut chunked = Chunked {
-            options,
-            stop,
-            scale,
-            progress: job.progress,
-        };
-        let done = chunked.reduce::<S, C>(&mut flat)?;
+    let original = match options.quality {
+        Quality::Best => Some((flat.positions.clone(), flat.triangles.clone())),
+        Quality::Fast | Quality::Standard => None,
+    };
+    let mut is_cancelled = false;
+    let mut is_prepared = false;
+    let mut chunked = Chunked {
+        options,
+        stop,
+        scale: scale_of_unit,
+        progress: job.progress,
+    };
+    if chunked.is_worthwhile(&flat) {
+        let needs_whole =
+            options.boundary == Boundary::Lock || options.feature_angle_degrees.is_some();
+        is_prepared = needs_whole;
+        if needs_whole {
+            flat = prepared(flat, options, scale_of_unit, report);
+        }
+        let mut done = chunked.reduce::<S, C>(&mut flat)?;
+        if done.is_disoriented {
+            is_prepared = true;
+            flat = prepared(flat, options, scale_of_unit, report);
+            done = chunked.reduce::<S, C>(&mut flat)?;
+        }
+        if !is_prepared {
+            report.non_manifold_edges_in = done.non_manifold_edges_in;
+        }
+        is_cancelled = done.is_cancelled;
         job.tally = done.tally;
         report.chunks = done.chunks;
         report.chunk_rounds = done.rounds;
         report.collapses_in_chunks = done.tally.collapses;
-        report.non_manifold_edges_in = done.non_manifold_edges_in;
     }
     report.chunk_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
     let Oriented { mesh, flipped, .. } =
         Mesh::<S>::oriented(flat.positions.len(), std::mem::take(&mut flat.triangles));
-    let (mut surface, states) = flat.into_surface(mesh, scale, &flipped);
+    let (mut surface, states) = flat.into_surface(mesh, scale_of_unit, &flipped);
     report.mesh_bytes = surface.mesh_bytes();
     if report.chunk_rounds == 0 {
         report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
     }
-    report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
+    if !is_prepared {
+        report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
+    }
     report.build_seconds = start.elapsed().as_secs_f64();
 
     let start = Instant::now();
-    if options.boundary == Boundary::Lock {
-        surface.lock_boundary();
+    if !is_prepared {
+        surface.prepare(options);
     }
-    if let Some(degrees) = options.feature_angle_degrees {
-        surface.mark_creases(degrees);
-    }
-    let (surface, (reason, blocked)) = match options.quality {
-        Quality::Fast | Quality::Standard => job.collapse::<S, C>(surface, states, stop),
-        Quality::Best => job.collapse_and_fit(surface, stop),
-    }?;
+    let (surface, (reason, blocked)) = match original {
+        _ if is_cancelled => (surface, (StopReason::Cancelled, None)),
+        None => job.collapse::<S, C>(surface, states, stop)?,
+        Some(original) => job.collapse_and_fit(surface, &original, stop)?,
+    };
     report.tally = job.tally;
     report.max_error_estimate = surface.max_deviation() / scale;
     report.triangles_out = surface.triangles();
@@ -220,26 +250,48 @@ fn run<S: EdgeStore, C: Cost<S>>(
         StopReason::Cancelled => true,
     };
 
-    let Surface {
-        mut mesh,
-        geometry,
-        mut double_sided,
-        mut turned,
+    let Flat {
+        mut positions,
+        mut triangles,
+        flags,
         ..
-    } = surface;
-    let map = mesh.compact();
-    let mut positions = geometry.into_positions();
-    Compaction::retain(&map.vertices, &mut positions);
-    Compaction::retain(&map.faces, &mut double_sided);
-    Compaction::retain(&map.faces, &mut turned);
-    let mut triangles = mesh.triangles();
-    drop(mesh);
+    } = surface.into_flat::<()>();
+    rescale(&mut positions, unit.recip());
+    let (mut turned, mut double_sided) = (Vec::new(), Vec::new());
+    if !flags.is_empty() {
+        turned.extend(flags.iter().map(|f| f.is_turned()));
+        double_sided.extend(flags.iter().map(|f| f.is_double_sided()));
+    }
     turn_round(&mut triangles, &turned);
     report.vertices_out = positions.len();
     let output =
         IndexedMesh::with_origin(origin, positions, triangles)?.with_double_sided(double_sided)?;
     report.decimate_seconds = start.elapsed().as_secs_f64() + report.chunk_seconds;
     Ok(output)
+}
+
+/// Scales between this and its inverse leave single precision room for what is computed.
+const MODERATE: f64 = (1u64 << 60) as f64;
+
+/// Multiplies positions by a power of two: exact, but for coordinates 2¹²⁶ times smaller than the
+/// mesh.
+fn rescale(positions: &mut [Vec3], factor: f64) {
+    if factor != 1.0 {
+        for p in positions {
+            *p = (p.as_dvec3() * factor).as_vec3();
+        }
+    }
+}
+
+/// The arrays, oriented, with what only the whole can tell: what is locked, and the creases.
+fn prepared<V>(mut flat: Flat<V>, options: &Options, scale: f64, report: &mut Report) -> Flat<V> {
+    let triangles = std::mem::take(&mut flat.triangles);
+    let oriented = Mesh::<Small>::oriented(flat.positions.len(), triangles);
+    let (mut surface, _) = flat.into_surface(oriented.mesh, scale, &oriented.flipped);
+    report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
+    report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
+    surface.prepare(options);
+    surface.into_flat()
 }
 
 type Stopped = (StopReason, Option<Blocked>);
@@ -264,7 +316,8 @@ impl Job<'_> {
         } else {
             C::with_states(&surface, self.options, states)
         };
-        let mut greedy = Greedy::new(surface, cost, self.options.topology, self.tally);
+        let mut greedy =
+            Greedy::<S, C, C::Queue>::new(surface, cost, self.options.topology, self.tally);
         let stopped = greedy.run(stop, self.options.check, self.progress)?;
         let (surface, _, tally) = greedy.into_parts();
         self.tally = tally;
@@ -276,6 +329,7 @@ impl Job<'_> {
     fn collapse_and_fit<S: EdgeStore>(
         &mut self,
         mut surface: Surface<S>,
+        (_positions, _triangles): &(Vec<Vec3>, Vec<[u32; 3]>),
         stop: Stop,
     ) -> Result<(Surface<S>, Stopped)> {
         let options = self.options;

@@ -64,6 +64,21 @@ pub enum Placement {
     Endpoint,
 }
 
+/// Whether pieces of the mesh that fit in the cache are decimated on their own, under one common
+/// threshold, before the whole is. It changes the result, by a percent or two, since edges between
+/// pieces wait; memory, to a fraction; and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Chunks {
+    /// Where the mesh is large enough to be quicker that way, and is not to keep most of its triangles.
+    #[default]
+    Auto,
+    /// Never.
+    Off,
+    /// Wherever the mesh is several times as large: pieces of at most about so many triangles.
+    Triangles(usize),
+}
+
 /// Which memory tier to decimate in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TierChoice {
@@ -89,6 +104,8 @@ pub struct Options {
     pub placement: Placement,
     /// Edges at which the surface turns by more than this are kept as curves; none where not given.
     pub feature_angle_degrees: Option<f64>,
+    /// Whether pieces of the mesh are decimated on their own first.
+    pub chunks: Chunks,
     /// The memory tier.
     pub tier: TierChoice,
     /// The bytes that decimation may use, for [`TierChoice::Auto`]; the memory that is free where
@@ -109,6 +126,7 @@ impl Default for Options {
             topology: Topology::default(),
             placement: Placement::default(),
             feature_angle_degrees: None,
+            chunks: Chunks::default(),
             tier: TierChoice::default(),
             memory_limit_bytes: None,
             weld: true,

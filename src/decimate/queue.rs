@@ -99,7 +99,9 @@ impl Queue for LazyHeap {
     }
 
     fn has_at_most(&self, cost: f32) -> bool {
-        self.heap.peek().is_some_and(|&(bits, _)| f32::from_bits(bits) <= cost)
+        self.heap
+            .peek()
+            .is_some_and(|&(bits, _)| f32::from_bits(bits) <= cost)
     }
 
     fn contains(&self, e: EdgeId) -> bool {
@@ -276,7 +278,9 @@ mod tests {
     fn agrees_with_a_list<Q: Queue>(coarseness: f32) {
         let mut state = 7u64;
         let mut random = move |n: u64| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 33) % n
         };
         let edges = 500;
@@ -298,8 +302,14 @@ mod tests {
                 assert_eq!(popped.is_some(), least.is_some());
                 if let (Some(popped), Some(least)) = (popped, least) {
                     let was = list[popped.edge.index()].take().expect("it was pushed");
-                    assert!(was <= (least * coarseness).max(f32::MIN_POSITIVE), "{was} {least}");
-                    assert!(was <= popped.cost && popped.cost <= (was * coarseness).max(f32::MIN_POSITIVE));
+                    assert!(
+                        was <= (least * coarseness).max(f32::MIN_POSITIVE),
+                        "{was} {least}"
+                    );
+                    assert!(
+                        was <= popped.cost
+                            && popped.cost <= (was * coarseness).max(f32::MIN_POSITIVE)
+                    );
                     assert!(!queue.contains(popped.edge));
                 }
             }

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 
 use super::geometry::Geometry;
+use super::options::{Boundary, Options};
 use super::rules;
 use crate::mesh::{Collapse, Contraction, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 
@@ -81,8 +82,18 @@ impl<S: EdgeStore> Surface<S> {
         self.locked[v.index()] = true;
     }
 
+    /// Locks the boundary and marks creases, where that is asked for. Needs the whole surface.
+    pub fn prepare(&mut self, options: &Options) {
+        if options.boundary == Boundary::Lock {
+            self.lock_boundary();
+        }
+        if let Some(degrees) = options.feature_angle_degrees {
+            self.mark_creases(degrees);
+        }
+    }
+
     /// Locks the vertices on boundary edges.
-    pub fn lock_boundary(&mut self) {
+    fn lock_boundary(&mut self) {
         let mut locked = std::mem::take(&mut self.locked);
         locked.resize(self.mesh.vertex_slots(), false);
         for e in self.mesh.edges().filter(|&e| self.mesh.is_boundary(e)) {
@@ -126,7 +137,7 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Marks the edges at which the surface turns by more than `degrees` as creases.
-    pub fn mark_creases(&mut self, degrees: f64) {
+    fn mark_creases(&mut self, degrees: f64) {
         let (mesh, geometry) = (&self.mesh, &self.geometry);
         let flattest = degrees.to_radians().cos();
         let is_sharp = |e: EdgeId| {

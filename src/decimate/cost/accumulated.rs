@@ -6,7 +6,8 @@ use wide::f32x4;
 
 use super::form::{Form, Least, Number, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, TIE_BREAK, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, TIE_BREAK, boundary_weight,
+    singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
@@ -110,7 +111,9 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         for f in mesh.faces() {
             let corners = mesh.face_vertices(f);
             let [a, b, c] = corners.map(|v| geometry.position(v));
-            let normal = geometry.vector(a, corners[1]).cross(geometry.vector(a, corners[2]));
+            let normal = geometry
+                .vector(a, corners[1])
+                .cross(geometry.vector(a, corners[2]));
             let length = normal.length();
             if length > 0.0 {
                 let mut plane = Symmetric::default();
@@ -125,7 +128,8 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
                 }
                 // A crease is met from both of its faces.
                 let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
-                let of_singular = || singular_weight(mesh, e, boundary).filter(|_| !surface.is_rim(e));
+                let of_singular =
+                    || singular_weight(mesh, e, boundary).filter(|_| !surface.is_rim(e));
                 if let Some(weight) = of_crease.or_else(of_singular) {
                     let along = along.as_dvec3() * geometry.scale();
                     for v in mesh.edge_vertices(e) {

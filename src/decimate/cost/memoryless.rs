@@ -12,7 +12,7 @@ use super::{
     BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
-use crate::decimate::queue::Buckets;
+use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::{Factor, Symmetric};
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
@@ -96,7 +96,6 @@ pub struct Memoryless {
 }
 
 impl Memoryless {
-
     /// The tensor of `v` from the faces around it now, and how far it may lag behind them.
     fn tensor<S: EdgeStore>(&self, surface: &Surface<S>, v: VertexId) -> (Tensor, Lag) {
         let (mesh, geometry) = (&surface.mesh, &surface.geometry);
@@ -189,7 +188,7 @@ fn add_fold(quadratic: &mut Symmetric, along: DVec3, a: Side, b: Side, is_crease
 impl<S: EdgeStore> Cost<S> for Memoryless {
     const IS_LAZY: bool = false;
 
-    type Queue = Buckets;
+    type Queue = LazyHeap;
     type State = ();
 
     fn new(surface: &Surface<S>, options: &Options) -> Self {

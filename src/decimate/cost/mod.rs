@@ -32,7 +32,7 @@ pub trait Cost<S: EdgeStore>: Send + Sync {
     /// that have none after a collapse become candidates again: for costs that never fall.
     const IS_LAZY: bool;
 
-    /// What keeps the candidates in order.
+    /// What keeps the candidates of a whole mesh in order.
     type Queue: Queue;
 
     /// What is known of a vertex beyond the surface around it.
