@@ -388,6 +388,11 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.tally
     }
 
+    /// The surface as it is now.
+    pub fn surface(&self) -> &Surface<S> {
+        &self.surface
+    }
+
     /// The triangles left, double-sided ones counted as two.
     pub fn triangles(&self) -> usize {
         self.triangles

@@ -10,7 +10,7 @@ use super::{
     singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
-use crate::decimate::queue::Buckets;
+use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
 use crate::mesh::{Collapse, EdgeId, EdgeStore, VertexId};
@@ -101,7 +101,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     /// Costs only grow: what an edge cost once is a lower bound.
     const IS_LAZY: bool = true;
 
-    type Queue = Buckets;
+    type Queue = LazyHeap;
     type State = Quadric;
 
     fn new(surface: &Surface<S>, options: &Options) -> Self {
