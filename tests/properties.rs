@@ -9,8 +9,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use decimate::clean::clean;
 use decimate::decimate::{
-    Boundary, Options, Placement, Quality, Report, StopReason, Targets, TierChoice, Topology,
-    decimate,
+    Boundary, Chunks, Options, Placement, Quality, Report, StopReason, Targets, TierChoice,
+    Topology, decimate,
 };
 use decimate::error::Error;
 use decimate::indexed_mesh::{IndexedMesh, Parts};
@@ -274,6 +274,7 @@ fn options(random: &mut Random) -> Options {
         quality: random.pick(&[Quality::Fast, Quality::Standard, Quality::Best]),
         feature_angle_degrees: random.pick(&[None, None, Some(30.0)]),
         weld: !random.one_in(3),
+        chunks: random.pick(&[Chunks::Auto, Chunks::Triangles(6), Chunks::Triangles(30)]),
         check: true,
         ..Options::default()
     }

@@ -31,7 +31,7 @@ const WORTHWHILE_FACES: usize = 50_000;
 
 /// The vertices of a chunk, at least and at most. A chunk's mesh and all that goes with it then take
 /// half a megabyte to one, which is what the second cache of a processor holds.
-const CHUNK_VERTICES: Range<usize> = 2048..4096;
+const CHUNK_VERTICES: Range<usize> = 4096..8192;
 
 /// Where chunks are asked for, the mesh has so many times as many faces at least.
 const SEVERAL: usize = 4;
@@ -242,9 +242,8 @@ impl Chunked<'_> {
         let deep: Vec<Vec<VertexId>> = chunks.par_iter().map(|c| c.deep(rings)).collect();
         let all: usize = deep.iter().map(Vec::len).sum();
         let (check, stop) = (self.options.check, self.stop);
-        let triangles = |chunks: &[Chunk<S, C>]| -> usize {
-            chunks.iter().map(|c| c.greedy.triangles()).sum()
-        };
+        let triangles =
+            |chunks: &[Chunk<S, C>]| -> usize { chunks.iter().map(|c| c.greedy.triangles()).sum() };
         let before = triangles(chunks);
         let mut max_cost = 0.0f32;
         loop {
@@ -271,7 +270,11 @@ impl Chunked<'_> {
             let Some(next) = next.reduce(f32::min) else {
                 return Ok(f32::INFINITY);
             };
-            let left: usize = chunks.iter().zip(&deep).map(|(c, deep)| c.left_of(deep)).sum();
+            let left: usize = chunks
+                .iter()
+                .zip(&deep)
+                .map(|(c, deep)| c.left_of(deep))
+                .sum();
             let left = left as f64 / all.max(1) as f64;
             if left <= density {
                 return Ok(max_cost);
@@ -336,6 +339,7 @@ struct Kept<V> {
     position: Vec3,
     deviation: f32,
     weight: f32,
+    is_locked: bool,
     state: V,
 }
 
@@ -459,15 +463,24 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         }
         // What no seam borders on is deep.
         let is_deep = |v: &VertexId, rings| distance[v.index()].is_none_or(|d| d > rings);
-        let deepest = reached.last().map_or(0, |v| distance[v.index()].unwrap_or(0));
+        let deepest = reached
+            .last()
+            .map_or(0, |v| distance[v.index()].unwrap_or(0));
         let rings = rings.min(deepest.saturating_sub(1));
-        surface.mesh.vertices().filter(|v| is_deep(v, rings)).collect()
+        surface
+            .mesh
+            .vertices()
+            .filter(|v| is_deep(v, rings))
+            .collect()
     }
 
     /// How many of these vertices are left.
     fn left_of(&self, vertices: &[VertexId]) -> usize {
         let mesh = &self.greedy.surface().mesh;
-        vertices.iter().filter(|&&v| mesh.outgoing(v) != Outgoing::None).count()
+        vertices
+            .iter()
+            .filter(|&&v| mesh.outgoing(v) != Outgoing::None)
+            .count()
     }
 
     /// Collapses what costs no more, down to a number of triangles at the least.
@@ -519,6 +532,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
                     position: surface.geometry.position(id),
                     deviation: surface.deviation[v],
                     weight: surface.weight(id) as f32,
+                    is_locked: surface.is_locked(id),
                     state,
                 });
             }
@@ -600,6 +614,9 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
             flat.deviation[v] = kept.deviation;
             if let Some(weight) = flat.weights.get_mut(v) {
                 *weight = kept.weight;
+            }
+            if let Some(locked) = flat.locked.get_mut(v) {
+                *locked = kept.is_locked;
             }
         }
     }

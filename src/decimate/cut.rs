@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::flat::Flat;
 use crate::spatial::Grid;
 
-/// A chunk ends at a multiple of this.
+/// A chunk ends at a multiple of this, where it is much larger.
 const GROUP: usize = 64;
 
 /// The faces that are sorted by chunk at a time, at least; and the most such blocks.
@@ -21,6 +21,8 @@ const MOST_BLOCKS: usize = 256;
 pub struct Cut {
     /// The first vertex of each chunk, and the end of the last.
     begins: Vec<u32>,
+    /// The vertices of a group.
+    group: usize,
     /// The chunk of each group of vertices.
     chunk_of_group: Vec<u32>,
     /// The faces of a block.
@@ -53,16 +55,22 @@ impl Cut {
             renamed[old as usize] = new as u32;
         }
         drop(order);
-        let begins = cuts(&flat.positions, &grid, chunk_vertices);
+        let group = if chunk_vertices.start < 4 * GROUP {
+            1
+        } else {
+            GROUP
+        };
+        let begins = cuts(&flat.positions, &grid, chunk_vertices, group);
         let mut cut = Self {
-            chunk_of_group: Vec::with_capacity(renamed.len().div_ceil(GROUP)),
+            group,
+            chunk_of_group: Vec::with_capacity(renamed.len().div_ceil(group)),
             block_faces: flat.triangles.len().div_ceil(MOST_BLOCKS).max(BLOCK_FACES),
             begins_in_block: Vec::new(),
             shared: Vec::new(),
             begins,
         };
         for (chunk, range) in cut.begins.windows(2).enumerate() {
-            let groups = (range[1] as usize).div_ceil(GROUP);
+            let groups = (range[1] as usize).div_ceil(group);
             cut.chunk_of_group.resize(groups, chunk as u32);
         }
         cut.shared
@@ -123,7 +131,7 @@ impl Cut {
     }
 
     fn chunk_of(&self, v: u32) -> u32 {
-        self.chunk_of_group[v as usize / GROUP]
+        self.chunk_of_group[v as usize / self.group]
     }
 
     /// The number of chunks.
@@ -159,14 +167,14 @@ impl Cut {
 
 /// Where chunks begin and end: within the bounds of their size, where the largest cubes of the grid
 /// meet.
-fn cuts(positions: &[Vec3], grid: &Grid, chunk_vertices: &Range<usize>) -> Vec<u32> {
+fn cuts(positions: &[Vec3], grid: &Grid, chunk_vertices: &Range<usize>, group: usize) -> Vec<u32> {
     let mut begins = vec![0];
     let mut begin = 0;
     while positions.len() - begin > chunk_vertices.end {
-        let first = begin + chunk_vertices.start.next_multiple_of(GROUP);
-        let last = begin + chunk_vertices.end.next_multiple_of(GROUP);
+        let first = begin + chunk_vertices.start.next_multiple_of(group);
+        let last = begin + chunk_vertices.end.next_multiple_of(group);
         let step_at = |&at: &usize| grid.code(positions[at - 1]) ^ grid.code(positions[at]);
-        let ends = (first..=last.min(positions.len() - 1)).step_by(GROUP);
+        let ends = (first..=last.min(positions.len() - 1)).step_by(group);
         let end = ends.max_by_key(step_at).expect("more than one group");
         begins.push(end as u32);
         begin = end;
