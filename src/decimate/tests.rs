@@ -1294,8 +1294,8 @@ mod chunked {
     }
 
     /// A dense bumpy ball on a coarse block: a hundred triangles for each of the block's size.
-    fn ball_on_a_block() -> Shape {
-        let (mut positions, mut triangles) = shapes::icosphere(5);
+    fn ball_on_a_block(levels: u32) -> Shape {
+        let (mut positions, mut triangles) = shapes::icosphere(levels);
         for p in &mut positions {
             *p *= 1.0 + 0.05 * (9.0 * p.x).sin() * (8.0 * p.y).cos() * (7.0 * p.z).sin();
         }
@@ -1350,7 +1350,7 @@ mod chunked {
             ("torus", shapes::torus(240, 80), 1.03),
             ("shuffled", shuffled(&even), 1.04),
             ("even", even, 1.04),
-            ("ball on a block", ball_on_a_block(), 1.05),
+            ("ball on a block", ball_on_a_block(6), 1.05),
         ] {
             let original = mesh(shape);
             for quality in [Quality::Fast, Quality::Standard] {
@@ -1364,7 +1364,8 @@ mod chunked {
                     );
                     (measured(&original, &small).surface.two_sided.rms, report)
                 };
-                let ((whole, off), (parts, on)) = (run(Chunks::Off), run(Chunks::Triangles(3000)));
+                let chunks = Chunks::Triangles(original.triangle_count() / 6);
+                let ((whole, off), (parts, on)) = (run(Chunks::Off), run(chunks));
                 println!(
                     "{name}, {quality:?}: {}, {} chunks",
                     parts / whole,
@@ -1384,7 +1385,7 @@ mod chunked {
 
     /// In chunks, too, the result is one, whatever the threads and the tier; it stays closed.
     fn chunks_are_the_same_bytes_with_any_number_of_threads<S: EdgeStore>() {
-        let original = mesh(ball_on_a_block());
+        let original = mesh(ball_on_a_block(5));
         let before = info(original.clone(), true).unwrap();
         for quality in QUALITIES {
             let run = |threads, tier| {
