@@ -6,7 +6,7 @@ use wide::f32x4;
 
 use super::form::{Form, Least, Number, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, TIE_BREAK, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::Buckets;
@@ -178,10 +178,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
             [a, b, c, d, e, f, g, h, i, j]
         };
         let least = least(&numbers(0), &numbers(1), along, self.placement);
-        let at_end = Number::choose(least.head_is_better, least.at_head, least.at_tail);
-        let energy = Number::choose(least.x_is_better, least.at_x, at_end);
-        let energy = Number::choose(energy.greater(f32x4::ZERO), energy, f32x4::ZERO);
-        (energy + f32x4::splat(TIE_BREAK as f32) * least.length_squared).to_array()
+        least.costs().to_array()
     }
 
     fn after_collapse(
