@@ -6,8 +6,7 @@ use wide::f32x4;
 
 use super::form::{Form, Least, Number, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, TIE_BREAK, boundary_weight,
-    singular_weight,
+    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
@@ -197,16 +196,9 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         let (from, to) = (places(surface, &tails), places(surface, &heads));
         let scale = f32x4::splat(surface.geometry.scale() as f32);
         let along = std::array::from_fn(|i| (to[i] - from[i]) * scale);
-        let least = least(
-            &self.numbers(&tails),
-            &self.numbers(&heads),
-            along,
-            self.placement,
-        );
-        let at_end = Number::choose(least.head_is_better, least.at_head, least.at_tail);
-        let energy = Number::choose(least.x_is_better, least.at_x, at_end);
-        let energy = Number::choose(energy.greater(f32x4::ZERO), energy, f32x4::ZERO);
-        (energy + f32x4::splat(TIE_BREAK as f32) * least.length_squared).to_array()
+        let numbers = [&tails, &heads].map(|ends| self.numbers(ends));
+        let least = least(&numbers[0], &numbers[1], along, self.placement);
+        least.costs().to_array()
     }
 
     fn after_collapse(

@@ -5,6 +5,8 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use wide::f32x4;
 
+use super::TIE_BREAK;
+
 /// Edges that are evaluated together.
 pub const LANES: usize = 4;
 
@@ -83,7 +85,16 @@ pub fn plus<T: Number, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
 }
 
 #[inline(always)]
-pub fn minus<T: Number>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+pub fn cross<T: Number>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+#[inline(always)]
+pub fn minus<T: Number, const N: usize>(a: &[T; N], b: &[T; N]) -> [T; N] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
@@ -111,6 +122,47 @@ pub struct Form<T> {
     pub along: Vector<T>,
 }
 
+/// L D Lᵀ of a symmetric matrix with a ridge. Stable where the adjugate is not: the ridge may be as
+/// small as the precision allows.
+pub struct Factor<T> {
+    l10: T,
+    l20: T,
+    l21: T,
+    inverse_d: Vector<T>,
+}
+
+impl<T: Number> Factor<T> {
+    /// Of m + ridge·I, m positive semidefinite: no pivot is below the ridge, whatever the noise.
+    #[inline(always)]
+    pub fn of(m: &Matrix<T>, ridge: T) -> Self {
+        let [xx, xy, xz, yy, yz, zz] = *m;
+        let inverse = |pivot: T| T::splat(1.0) / T::choose(pivot.greater(ridge), pivot, ridge);
+        let inverse_d0 = inverse(xx + ridge);
+        let l10 = xy * inverse_d0;
+        let l20 = xz * inverse_d0;
+        let inverse_d1 = inverse(yy + ridge - l10 * xy);
+        let s21 = yz - l20 * xy;
+        let l21 = s21 * inverse_d1;
+        let inverse_d2 = inverse(zz + ridge - l20 * xz - l21 * s21);
+        Self {
+            l10,
+            l20,
+            l21,
+            inverse_d: [inverse_d0, inverse_d1, inverse_d2],
+        }
+    }
+
+    #[inline(always)]
+    pub fn solve(&self, b: &Vector<T>) -> Vector<T> {
+        let y = b[1] - self.l10 * b[0];
+        let z = b[2] - self.l20 * b[0] - self.l21 * y;
+        let z = z * self.inverse_d[2];
+        let y = y * self.inverse_d[1] - self.l21 * z;
+        let x = b[0] * self.inverse_d[0] - self.l10 * y - self.l20 * z;
+        [x, y, z]
+    }
+}
+
 /// Where an edge's energy is least.
 pub struct Least<T: Number> {
     pub x: Vector<T>,
@@ -123,6 +175,18 @@ pub struct Least<T: Number> {
     pub x_is_better: T::Mask,
     /// The squared length of the edge.
     pub length_squared: T,
+}
+
+impl<T: Number> Least<T> {
+    /// What the collapse costs where no end is held.
+    #[inline(always)]
+    pub fn costs(&self) -> T {
+        let at_end = T::choose(self.head_is_better, self.at_head, self.at_tail);
+        let energy = T::choose(self.x_is_better, self.at_x, at_end);
+        let zero = T::splat(0.0);
+        let energy = T::choose(energy.greater(zero), energy, zero);
+        energy + T::splat(TIE_BREAK) * self.length_squared
+    }
 }
 
 /// How far the optimum may lie from the middle, in lengths of the edge.

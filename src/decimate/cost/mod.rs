@@ -5,6 +5,7 @@
 mod accumulated;
 mod form;
 mod memoryless;
+mod star;
 
 pub use accumulated::Accumulated;
 pub use form::LANES;
@@ -162,5 +163,31 @@ impl Choice {
         };
         let cost = energy.max(0.0) + TIE_BREAK * self.length_squared;
         (cost.is_finite() && position.is_finite()).then_some(Evaluation { cost, position })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decimate::geometry::{Geometry, scale_to_unit};
+
+    /// A surface of nothing but a shape.
+    pub(super) fn surface<S: EdgeStore>(shape: (Vec<Vec3>, Vec<[u32; 3]>)) -> Surface<S> {
+        let (positions, triangles) = shape;
+        let extent = positions
+            .iter()
+            .fold(0.0, |extent, p| p.abs().max_element().max(extent));
+        Surface {
+            mesh: Mesh::from_triangles(positions.len(), &triangles),
+            deviation: vec![0.0; positions.len()],
+            geometry: Geometry::new(positions, scale_to_unit(extent.into())),
+            locked: Vec::new(),
+            double_sided: Vec::new(),
+            turned: Vec::new(),
+            creases: Vec::new(),
+            weights: Vec::new(),
+            seam: Vec::new(),
+            lost: 0.0,
+        }
     }
 }
