@@ -285,7 +285,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     #[inline]
     fn next(&mut self) -> std::result::Result<Candidate, Halt> {
         loop {
-            if let Some(candidate) = self.ready.pop() {
+            while let Some(candidate) = self.ready.pop() {
                 if self.is_unchanged(candidate.edge) {
                     return Ok(candidate);
                 }
@@ -381,11 +381,6 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             }
         }
         self.edges = edges;
-    }
-
-    /// What was counted so far.
-    pub fn tally(&self) -> Tally {
-        self.tally
     }
 
     /// The surface as it is now.

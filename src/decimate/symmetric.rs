@@ -7,10 +7,6 @@ use glam::DVec3;
 pub(super) struct Symmetric(pub(super) [f64; 6]);
 
 impl Symmetric {
-    pub(super) fn from_single(m: [f32; 6]) -> Self {
-        Self(m.map(f64::from))
-    }
-
     /// Adds w·v vᵀ.
     #[inline(always)]
     pub(super) fn add_outer(&mut self, v: DVec3, w: f64) {
@@ -41,11 +37,6 @@ impl Symmetric {
     #[inline(always)]
     pub(super) fn plus(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
-    }
-
-    #[inline(always)]
-    pub(super) fn trace(&self) -> f64 {
-        self.0[0] + self.0[3] + self.0[5]
     }
 
     #[inline(always)]
