@@ -72,19 +72,39 @@ impl Grid {
         x | y << 1 | z << 2
     }
 
+    /// The side of a cell; 0 where all positions are one.
+    pub fn cell_side(&self) -> f64 {
+        if self.cells_per_unit > 0.0 {
+            self.cells_per_unit.recip()
+        } else {
+            0.0
+        }
+    }
+
     /// The ids of the positions in Morton order; within a cell by position (x, y, z, as numbers:
     /// −0 is 0), those that are not finite last; then by id.
     ///
     /// Takes 16 bytes a position while it runs, linear time, and O(n log n) for n positions in one
     /// cell. The order does not depend on the number of threads.
     pub fn order(&self, positions: &[Vec3]) -> Vec<u32> {
+        let places = self.places(positions);
+        places.into_par_iter().map(id).with_min_len(BLOCK).collect()
+    }
+
+    /// The [codes](Self::code) of the positions and their ids, in the [order](Self::order).
+    pub fn sorted(&self, positions: &[Vec3]) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let places = self.places(positions);
+        places.into_iter().map(|place| (code(place), id(place)))
+    }
+
+    fn places(&self, positions: &[Vec3]) -> Vec<u64> {
         let numbered = (0..positions.len() as u32).into_par_iter();
         let mut places: Vec<u64> = numbered
             .with_min_len(BLOCK)
             .map(|v| place(self.code(positions[v as usize]), v))
             .collect();
         sort_places(&mut places, positions);
-        places.into_par_iter().map(id).with_min_len(BLOCK).collect()
+        places
     }
 }
 

@@ -4,10 +4,9 @@ use super::options::{Options, Quality, TierChoice};
 use crate::error::{Error, Result};
 use crate::mesh::Tier;
 
-/// What fitting takes a triangle of the original: 150 for its hierarchy and samples, 100 for the lists
-/// of the samples on each face and the distances, and while those are found the hierarchy of what is
-/// left. Measured 260 to 400 at 10 to 90 %.
-const FITTING_BYTES: usize = 400;
+/// What fitting takes a triangle of the original: 18 for its arrays, 36 to sort it into cells, and as
+/// much for what is left of it.
+const FITTING_BYTES: usize = 90;
 
 /// The most bytes that decimating a manifold mesh in a tier holds at once: the tier's words and
 /// positions; tensors or quadrics, stamps, deviations and the queue, or what fitting takes.
@@ -18,7 +17,7 @@ pub fn needed_bytes(quality: Quality, tier: Tier, vertices: usize, triangles: us
     let collapsing = 48 * vertices + 36 * triangles;
     let most = match quality {
         Quality::Fast | Quality::Standard => collapsing,
-        Quality::Best => FITTING_BYTES * triangles,
+        Quality::Best => (collapsing + 12 * (vertices + triangles)).max(FITTING_BYTES * triangles),
     };
     (tier.bytes(vertices, triangles) + most) as u64
 }

@@ -9,7 +9,6 @@ mod geometry;
 mod greedy;
 mod memory;
 mod options;
-mod original;
 mod queue;
 mod report;
 mod rules;
@@ -32,11 +31,10 @@ pub use report::{Blocked, Report, StopReason, Tally};
 
 use chunked::Chunked;
 use cost::{Accumulated, Cost, Memoryless};
-use fit::Fit;
+use fit::{Arrays, Terms, fit_to_original};
 use flat::Flat;
 use geometry::scale_to_unit;
 use greedy::{Greedy, Stop};
-use original::Original;
 use surface::Surface;
 
 /// How far decimation has come.
@@ -333,8 +331,19 @@ impl Job<'_> {
         stop: Stop,
     ) -> Result<(Surface<S>, Stopped)> {
         let options = self.options;
-        let with_boundary = options.boundary == Boundary::Keep;
-        let original = Original::new(&surface, stop.triangles, with_boundary);
+        let positions = surface.geometry.positions().to_vec();
+        let corners = surface.mesh.faces().map(|f| surface.mesh.face_vertices(f));
+        let triangles: Vec<[u32; 3]> = corners.map(|t| t.map(|v| v.index() as u32)).collect();
+        let original = Arrays {
+            positions: &positions,
+            triangles: &triangles,
+        };
+        let terms = Terms {
+            target: stop.triangles,
+            with_boundary: options.boundary == Boundary::Keep,
+            moves: options.placement == Placement::Optimal,
+            max_error: options.targets.max_error,
+        };
         loop {
             let triangles = surface.triangles();
             let stopped;
@@ -343,15 +352,8 @@ impl Job<'_> {
             if stopped.0 == StopReason::Cancelled || is_untouched {
                 return Ok((surface, stopped));
             }
-            let is_light = surface.mesh.face_count() * LIGHT > original.faces.len();
-            let sweeps = if is_light { SWEEPS - 1 } else { SWEEPS };
-            let mut fit = Fit::new(&mut surface, &original, options.targets.max_error);
-            self.tally.working_bytes = self.tally.working_bytes.max(original.bytes() + fit.bytes());
-            fit.flip_edges();
-            if options.placement == Placement::Optimal {
-                (0..sweeps).for_each(|_| fit.move_vertices());
-            }
-            fit.finish();
+            let bytes = fit_to_original(&mut surface, original, &terms);
+            self.tally.working_bytes = self.tally.working_bytes.max(bytes);
             if options.check {
                 let wrong = |wrong| Error::Internal(format!("after fitting: {wrong}"));
                 surface.mesh.check().map_err(wrong)?;
@@ -363,15 +365,6 @@ impl Job<'_> {
         }
     }
 }
-
-/// Sweeps over the vertices: the second saves 2 % of rms, the third 0.6 %. Fitting after each
-/// halving of the triangles as well saves 0.9 % and takes 40 % longer; a second round of flips and
-/// sweeps, with the samples' nearest faces found anew, saves 1.2 % and takes 60 % longer.
-const SWEEPS: usize = 3;
-
-/// Where more than one in this many faces is left, a sweep less: it would take longer than all the
-/// collapses, for less.
-const LIGHT: usize = 3;
 
 /// Where a turn leaves more than this of the triangles, another is not worth its time.
 const STUCK: f64 = 0.98;

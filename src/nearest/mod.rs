@@ -9,10 +9,14 @@
 //! 0.61 s. This one also takes segments and points as triangles, lists the pairs whose boxes overlap,
 //! and breaks ties by the smallest index.
 
+mod lanes;
+mod patch;
 mod triangle;
 
 use glam::{DVec3, Vec3, Vec4};
 
+pub use lanes::{Faces, Feet, Points};
+pub use patch::{GROUP, Near, Patch};
 pub use triangle::{Foot, Nearest, foot_on_triangle, nearest_on_triangle};
 
 /// Triangles in a subtree that is worth a thread of its own.
