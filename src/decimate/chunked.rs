@@ -249,7 +249,8 @@ impl Chunked<'_> {
         loop {
             // What is left to remove, shared out anew at every step, so that it stops no chunk that has
             // more to remove at this cost than others.
-            let budget = budget.saturating_sub(before - triangles(chunks)) / chunks.len().max(1);
+            let now = triangles(chunks);
+            let budget = budget.saturating_sub(before - now) / chunks.len().max(1);
             if budget <= MOST_AT_ONCE {
                 return Ok(max_cost);
             }
@@ -260,7 +261,7 @@ impl Chunked<'_> {
                     chunk.advance(check, stop, max_cost, least)
                 })
                 .collect::<Result<_>>()?;
-            if halts.contains(&Halt::Target) {
+            if halts.contains(&Halt::Target) && triangles(chunks) < now {
                 continue;
             }
             let next = halts.iter().filter_map(|halt| match halt {
@@ -314,6 +315,8 @@ struct Chunk<S: EdgeStore, C: Cost<S>> {
     /// Of these, the ones that are on no seam.
     inner: usize,
     triangles_before: usize,
+    /// Whether anything is said of the faces of the whole.
+    has_flags: bool,
     singular: Singular,
 }
 
@@ -437,6 +440,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             vertices,
             own,
             inner,
+            has_flags: !flat.flags.is_empty(),
             singular,
         }
     }
@@ -513,7 +517,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             removed_triangles,
             tally,
         };
-        if surface.has_flags() {
+        if self.has_flags {
             outcome.flags = mesh.faces().map(|f| surface.flags(f)).collect();
         }
         let is_stateless = size_of::<C::State>() == 0;
