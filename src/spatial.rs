@@ -13,7 +13,7 @@ pub struct Grid {
 }
 
 /// Bits of a cell coordinate.
-const AXIS_BITS: u32 = 10;
+pub const AXIS_BITS: u32 = 10;
 const CELLS_A_SIDE: u32 = 1 << AXIS_BITS;
 /// The last cell, where positions that are not finite go.
 const LAST_CODE: u32 = (1 << (3 * AXIS_BITS)) - 1;
@@ -58,6 +58,19 @@ impl Grid {
         }
     }
 
+    /// The cell of a position, counted along each axis; of a position outside of the grid the
+    /// nearest.
+    pub fn cell(&self, p: Vec3) -> [u32; 3] {
+        let cell = (p.as_dvec3() - self.corner) * self.cells_per_unit;
+        cell.to_array().map(|c| (c as u32).min(CELLS_A_SIDE - 1))
+    }
+
+    /// The Morton code of a cell.
+    pub fn code_of(cell: [u32; 3]) -> u32 {
+        let [x, y, z] = cell.map(spread);
+        x | y << 1 | z << 2
+    }
+
     /// The Morton code of the cell of a position: 30 bits, 10 an axis, x the lowest of each three.
     ///
     /// A position outside of the grid takes the nearest cell, one that is not finite the last.
@@ -65,11 +78,7 @@ impl Grid {
         if !p.is_finite() {
             return LAST_CODE;
         }
-        let cell = (p.as_dvec3() - self.corner) * self.cells_per_unit;
-        let [x, y, z] = cell
-            .to_array()
-            .map(|c| spread((c as u32).min(CELLS_A_SIDE - 1)));
-        x | y << 1 | z << 2
+        Self::code_of(self.cell(p))
     }
 
     /// The side of a cell; 0 where all positions are one.

@@ -151,12 +151,8 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let parts = input.into_parts();
     let origin = parts.origin;
     let mut flat = Flat::<C::State>::of(parts);
-    // Single precision has room for lengths like these and their fourth powers.
-    let unit = if (MODERATE.recip()..=MODERATE).contains(&scale) {
-        1.0
-    } else {
-        scale
-    };
+    // Single precision has no room for the scale of a tiny mesh, and takes a larger one exactly.
+    let unit = if scale > MODERATE { scale } else { 1.0 };
     rescale(&mut flat.positions, unit);
     let scale_of_unit = scale / unit;
     let stop = Stop {
@@ -268,11 +264,10 @@ fn run<S: EdgeStore, C: Cost<S>>(
     Ok(output)
 }
 
-/// Scales between this and its inverse leave single precision room for what is computed.
+/// Up to this scale single precision has room for what is computed.
 const MODERATE: f64 = (1u64 << 60) as f64;
 
-/// Multiplies positions by a power of two: exact, but for coordinates 2¹²⁶ times smaller than the
-/// mesh.
+/// Multiplies positions by a power of two, which is exact: of a tiny mesh to the unit box, and back.
 fn rescale(positions: &mut [Vec3], factor: f64) {
     if factor != 1.0 {
         for p in positions {

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::spatial::Grid;
+use crate::spatial::{AXIS_BITS, Grid};
 
 /// Bits of a cell's coordinate at most: a set of cells takes 2 MB then.
 const MOST_BITS: u32 = 8;
@@ -119,24 +119,18 @@ impl Cells {
         }
         let side = side(&self.grid, self.bits);
         let reach = Vec3::splat((REACH * side) as f32);
-        let step = if side > 0.0 { side as f32 } else { 1.0 };
         seen.bits.resize(1 << (3 * self.bits).max(6) >> 6, 0);
         let mut cells = Vec::new();
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for [min, max] in boxes {
             (low, high) = (low.min(min), high.max(max));
             let (min, max) = (min - reach, max + reach);
-            // A step short of a cell, so that rounding leaves none out.
-            let along = |axis: usize| {
-                let steps = ((max[axis] - min[axis]) / (0.999 * step)).min(1024.0) as usize;
-                (0..steps + 1)
-                    .map(move |i| min[axis] + 0.999 * step * i as f32)
-                    .chain(std::iter::once(max[axis]))
-            };
-            for z in along(2) {
-                for y in along(1) {
-                    for x in along(0) {
-                        let cell = self.cell(Vec3::new(x, y, z));
+            let shift = AXIS_BITS - self.bits;
+            let [first, last] = [min, max].map(|p| self.grid.cell(p).map(|c| c >> shift));
+            for z in first[2]..=last[2] {
+                for y in first[1]..=last[1] {
+                    for x in first[0]..=last[0] {
+                        let cell = Grid::code_of([x, y, z]);
                         let word = &mut seen.bits[cell as usize >> 6];
                         let bit = 1 << (cell & 63);
                         if *word & bit == 0 {
