@@ -322,29 +322,27 @@ impl Job<'_> {
     fn collapse_and_fit<S: EdgeStore>(
         &mut self,
         mut surface: Surface<S>,
-        (_positions, _triangles): &(Vec<Vec3>, Vec<[u32; 3]>),
+        (positions, triangles): &(Vec<Vec3>, Vec<[u32; 3]>),
         stop: Stop,
     ) -> Result<(Surface<S>, Stopped)> {
         let options = self.options;
-        let positions = surface.geometry.positions().to_vec();
-        let corners = surface.mesh.faces().map(|f| surface.mesh.face_vertices(f));
-        let triangles: Vec<[u32; 3]> = corners.map(|t| t.map(|v| v.index() as u32)).collect();
-        let original = Arrays {
-            positions: &positions,
-            triangles: &triangles,
-        };
+        let scale = surface.geometry.scale();
         let terms = Terms {
             target: stop.triangles,
             with_boundary: options.boundary == Boundary::Keep,
             moves: options.placement == Placement::Optimal,
-            max_error: options.targets.max_error,
+            max_error: stop.max_error.map(|e| e / scale),
+        };
+        let mut faces = triangles.len();
+        let original = Arrays {
+            positions,
+            triangles,
         };
         loop {
-            let triangles = surface.triangles();
             let stopped;
             (surface, stopped) = self.collapse::<S, Memoryless>(surface, Vec::new(), stop)?;
-            let is_untouched = surface.triangles() == triangles;
-            if stopped.0 == StopReason::Cancelled || is_untouched {
+            let faces_before = std::mem::replace(&mut faces, surface.mesh.face_count());
+            if stopped.0 == StopReason::Cancelled || faces == faces_before {
                 return Ok((surface, stopped));
             }
             let bytes = fit_to_original(&mut surface, original, &terms);
@@ -353,7 +351,7 @@ impl Job<'_> {
                 let wrong = |wrong| Error::Internal(format!("after fitting: {wrong}"));
                 surface.mesh.check().map_err(wrong)?;
             }
-            let is_stuck = surface.triangles() as f64 > STUCK * triangles as f64;
+            let is_stuck = faces as f64 > STUCK * faces_before as f64;
             if stopped.0 != StopReason::MaxError || is_stuck {
                 return Ok((surface, stopped));
             }
