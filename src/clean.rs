@@ -199,9 +199,11 @@ fn weld_positions(parts: &mut Parts) -> usize {
     }
     if welded > 0 {
         rename(&first, &mut parts.triangles);
-        for v in 0..parts.weights.len() {
-            let at_first = first[v] as usize;
-            parts.weights[at_first] = parts.weights[at_first].max(parts.weights[v]);
+        let weights = &mut parts.weights;
+        // Where there are weights at all.
+        for (v, &at_first) in first.iter().enumerate().take(weights.len()) {
+            let at_first = at_first as usize;
+            weights[at_first] = weights[at_first].max(weights[v]);
         }
     }
     welded

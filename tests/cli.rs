@@ -551,8 +551,12 @@ fn tiers_and_threads_give_the_same_bytes() {
 #[test]
 fn the_report_has_its_keys() {
     let folder = Folder::with(&["sample.ply"]);
-    let report = folder.report("sample.ply -o out.ply --ratio 0.1");
+    let report = folder.report("sample.ply -o out.ply --ratio 0.1 --chunks off");
     for key in [
+        "chunks",
+        "chunk_rounds",
+        "collapses_in_chunks",
+        "chunk_seconds",
         "vertices_in",
         "triangles_in",
         "vertices_out",
@@ -723,12 +727,13 @@ fn a_full_disk_is_an_error() {
 fn a_memory_limit_that_nothing_fits_says_what_is_needed() {
     let folder = Folder::with(&["sample.ply"]);
     let needed = |tier| needed_bytes(Quality::Standard, tier, 50_074, 99_969) as f64 / 1e6;
-    let ran = folder.run("sample.ply -o out.ply --ratio 0.1 --memory-limit 1KB");
+    let ran = folder.run("sample.ply -o out.ply --ratio 0.1 --chunks off --memory-limit 1KB");
     ran.failed(
         1,
         &format!("small tier needs {:.1} MB", needed(Tier::Small)),
     );
-    let ran = folder.run("sample.ply -o out.ply --ratio 0.1 --memory-limit 1KB --tier full");
+    let ran =
+        folder.run("sample.ply -o out.ply --ratio 0.1 --chunks off --memory-limit 1KB --tier full");
     ran.failed(1, &format!("full tier needs {:.1} MB", needed(Tier::Full)));
 }
 

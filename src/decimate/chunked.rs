@@ -74,6 +74,49 @@ const BATCH: usize = 64;
 /// The second round's grid lies this share of the box elsewhere.
 const SHIFT: f32 = 0.29;
 
+/// How a mesh is decimated in chunks.
+pub struct Sizes {
+    /// The share of the faces that chunks leave.
+    density: f64,
+    /// The vertices of a chunk, at least and at most.
+    vertices: Range<usize>,
+}
+
+impl Sizes {
+    /// The sizes for a mesh of so many faces, double-sided ones counted as two in `triangles`, on its
+    /// way to a target; nothing where chunks are not worth it.
+    pub fn of(chunks: Chunks, faces: usize, triangles: usize, target: usize) -> Option<Self> {
+        let (least_faces, vertices) = match chunks {
+            Chunks::Off => return None,
+            Chunks::Auto => (WORTHWHILE_FACES, CHUNK_VERTICES),
+            Chunks::Triangles(triangles) => {
+                let most = (triangles / 2).max(2);
+                (SEVERAL.saturating_mul(triangles), most / 2..most)
+            }
+        };
+        let least = ABOVE_TARGET * target as f64;
+        let density = (least / triangles as f64).max(LEAST_DENSITY);
+        let is_worthwhile = faces >= least_faces && density <= WORTHWHILE;
+        is_worthwhile.then_some(Self { density, vertices })
+    }
+
+    /// The most bytes held beside the input's arrays while a mesh is decimated in these chunks: what
+    /// sorting it takes, or the pilot's meshes and what is left of all chunks, twice while they are
+    /// put together. `bytes` is what a triangle takes in decimation.
+    pub fn bytes(&self, vertices: usize, triangles: usize, bytes: usize) -> usize {
+        /// Of the vertices, those on seams in the first round, about.
+        const ON_SEAM: f64 = 0.1;
+        /// What is left, per triangle: itself, half a vertex and its state, and the same again.
+        const LEFT_BYTES: f64 = 70.0;
+        let sorting = 32 * vertices;
+        let piloted = (PILOT_CHUNKS * 2 * self.vertices.end).min(triangles);
+        let piloted = piloted.max((PILOT_SHARE * triangles as f64) as usize);
+        let left = (self.density + ON_SEAM).min(1.0) * triangles as f64;
+        let rounds = 8 * vertices + piloted * bytes + (left * LEFT_BYTES) as usize;
+        sorting.max(rounds).max((left * bytes as f64) as usize)
+    }
+}
+
 /// What decimation in chunks goes by.
 pub struct Chunked<'a> {
     pub options: &'a Options,
@@ -100,31 +143,22 @@ pub struct Done {
     pub is_cancelled: bool,
 }
 
-impl Chunked<'_> {
-    /// The least number of faces that is decimated in chunks, and the vertices of a chunk.
-    fn sizes(&self) -> Option<(usize, Range<usize>)> {
-        match self.options.chunks {
-            Chunks::Off => None,
-            Chunks::Auto => Some((WORTHWHILE_FACES, CHUNK_VERTICES)),
-            Chunks::Triangles(triangles) => {
-                let most = (triangles / 2).max(2);
-                Some((SEVERAL * triangles, most / 2..most))
-            }
-        }
+impl Done {
+    /// Notes the bytes held now, where they are the most so far.
+    fn note_bytes(&mut self, bytes: usize) {
+        self.tally.working_bytes = self.tally.working_bytes.max(bytes);
     }
+}
 
-    /// The density to which chunks would bring a mesh, if that is worth it.
-    fn density<V>(&self, flat: &Flat<V>) -> Option<(f64, Range<usize>)> {
-        let (least_faces, chunk_vertices) = self.sizes()?;
-        let least = ABOVE_TARGET * self.stop.triangles as f64;
-        let density = (least / flat.triangle_count() as f64).max(LEAST_DENSITY);
-        (flat.triangles.len() >= least_faces && density <= WORTHWHILE)
-            .then_some((density, chunk_vertices))
+impl Chunked<'_> {
+    fn sizes<V>(&self, flat: &Flat<V>) -> Option<Sizes> {
+        let (faces, triangles) = (flat.triangles.len(), flat.triangle_count());
+        Sizes::of(self.options.chunks, faces, triangles, self.stop.triangles)
     }
 
     /// Whether chunks are worth it.
     pub fn is_worthwhile<V>(&self, flat: &Flat<V>) -> bool {
-        self.density(flat).is_some()
+        self.sizes(flat).is_some()
     }
 
     /// Decimates towards the target, not below it; as far as it is worth it.
@@ -133,14 +167,14 @@ impl Chunked<'_> {
     /// As [`Greedy::advance`].
     pub fn reduce<S: EdgeStore, C: Cost<S>>(&mut self, flat: &mut Flat<C::State>) -> Result<Done> {
         let mut done = Done::default();
-        while let Some((density, chunk_vertices)) = self.density(flat) {
+        while let Some(Sizes { density, vertices }) = self.sizes(flat) {
             let faces = flat.triangle_count();
             let until = Until::Density(density);
-            let max_cost = self.round::<S, C>(flat, until, &chunk_vertices, &mut done)?;
+            let max_cost = self.round::<S, C>(flat, until, &vertices, &mut done)?;
             if done.is_cancelled || done.is_disoriented {
                 break;
             }
-            self.round::<S, C>(flat, Until::Cost(max_cost), &chunk_vertices, &mut done)?;
+            self.round::<S, C>(flat, Until::Cost(max_cost), &vertices, &mut done)?;
             if done.is_cancelled || flat.triangle_count() as f64 > WORTHWHILE * faces as f64 {
                 break;
             }
@@ -181,6 +215,8 @@ impl Chunked<'_> {
                 }
                 let budget = triangles.saturating_sub(self.stop.triangles);
                 let max_cost = self.advance_together(&mut chunks, density, budget)?;
+                let piloted: usize = chunks.iter().map(Chunk::bytes).sum();
+                done.note_bytes(piloted + cut.bytes());
                 let ended: Vec<_> = chunks.into_par_iter().map(Chunk::end).collect();
                 for (k, outcome) in pilots.into_iter().zip(ended) {
                     triangles -= outcome.removed_triangles;
@@ -222,6 +258,8 @@ impl Chunked<'_> {
         for outcome in outcomes.iter().flatten() {
             done.tally.add(&outcome.tally);
         }
+        let left: usize = outcomes.iter().flatten().map(Outcome::bytes).sum();
+        done.note_bytes(left + cut.bytes());
         let non_manifold_edges =
             assemble::<S, C>(self.options, self.scale, flat, &cut, outcomes, is_first);
         if is_first {
@@ -334,6 +372,16 @@ struct Outcome<V> {
     singular: Singular,
     removed_triangles: usize,
     tally: Tally,
+}
+
+impl<V> Outcome<V> {
+    /// The bytes held.
+    fn bytes(&self) -> usize {
+        self.triangles.capacity() * size_of::<[u32; 3]>()
+            + self.kept.capacity() * size_of::<Kept<V>>()
+            + self.of_seam.capacity() * size_of::<(u32, V)>()
+            + self.singular.rim.capacity() * size_of::<RimEdge>()
+    }
 }
 
 /// A vertex that is left.
@@ -496,6 +544,13 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         };
         let on = &mut |_| ControlFlow::Continue(());
         self.greedy.advance(stop, check, on)
+    }
+
+    /// The bytes that the chunk holds.
+    fn bytes(&self) -> usize {
+        self.greedy.surface().mesh_bytes()
+            + self.greedy.tally().working_bytes
+            + self.vertices.capacity() * size_of::<u32>()
     }
 
     /// What is left.

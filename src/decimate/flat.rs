@@ -103,16 +103,6 @@ impl<V> Flat<V> {
         self.triangles.len() + double
     }
 
-    /// The bytes of what the arrays hold.
-    pub fn bytes(&self) -> usize {
-        size_of::<Vec3>() * self.positions.capacity()
-            + size_of::<[u32; 3]>() * self.triangles.capacity()
-            + self.locked.capacity()
-            + size_of::<f32>() * (self.weights.capacity() + self.deviation.capacity())
-            + size_of::<V>() * self.states.capacity()
-            + self.flags.capacity()
-    }
-
     /// The flags of faces of which some are known to be double-sided, turned round, or to have creases
     /// as edges; nothing where none is.
     pub fn flags_of(

@@ -31,11 +31,6 @@ impl Geometry {
     }
 
     /// The positions, one a vertex slot.
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    /// The positions, one a vertex slot.
     pub fn into_positions(self) -> Vec<Vec3> {
         self.positions
     }

@@ -383,6 +383,11 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.edges = edges;
     }
 
+    /// What was counted so far.
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
     /// The surface as it is now.
     pub fn surface(&self) -> &Surface<S> {
         &self.surface

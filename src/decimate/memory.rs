@@ -1,5 +1,6 @@
 //! How much memory there is, how much a tier needs, and so which to take.
 
+use super::chunked::Sizes;
 use super::options::{Options, Quality, TierChoice};
 use crate::error::{Error, Result};
 use crate::mesh::Tier;
@@ -8,13 +9,18 @@ use crate::mesh::Tier;
 /// much for what is left of it.
 const FITTING_BYTES: usize = 90;
 
-/// The most bytes that decimating a manifold mesh in a tier holds at once: the tier's words and
+/// What collapsing takes a vertex, for its tensor or quadric, stamps and deviation, and a triangle, for
+/// the queue.
+const COLLAPSING_VERTEX: usize = 48;
+const COLLAPSING_FACE: usize = 36;
+
+/// The most bytes that decimating a manifold mesh as a whole in a tier holds at once: the tier's words and
 /// positions; tensors or quadrics, stamps, deviations and the queue, or what fitting takes.
 ///
 /// Building holds less: 60 bytes a triangle and 24 a vertex before the tier's words are made, 24 a
 /// triangle beside them.
 pub fn needed_bytes(quality: Quality, tier: Tier, vertices: usize, triangles: usize) -> u64 {
-    let collapsing = 48 * vertices + 36 * triangles;
+    let collapsing = COLLAPSING_VERTEX * vertices + COLLAPSING_FACE * triangles;
     let most = match quality {
         Quality::Fast | Quality::Standard => collapsing,
         Quality::Best => (collapsing + 12 * (vertices + triangles)).max(FITTING_BYTES * triangles),
@@ -55,17 +61,40 @@ pub fn peak_rss_bytes() -> Option<u64> {
     high_water_mark().or_else(held_now)
 }
 
+/// The same where the mesh is decimated in chunks.
+fn bytes_in_chunks(
+    sizes: &Sizes,
+    quality: Quality,
+    tier: Tier,
+    vertices: usize,
+    triangles: usize,
+) -> u64 {
+    let arrays = 12 * (vertices + triangles);
+    let per_triangle = tier.bytes(1, 2) / 2 + (COLLAPSING_VERTEX / 2 + COLLAPSING_FACE);
+    let chunks = sizes.bytes(vertices, triangles, per_triangle);
+    let most = match quality {
+        Quality::Fast | Quality::Standard => arrays + chunks,
+        Quality::Best => 2 * arrays + chunks.max(FITTING_BYTES * triangles),
+    };
+    most as u64
+}
+
 /// The tier to use, and why.
 pub(super) fn choose_tier(
     options: &Options,
     vertices: usize,
     triangles: usize,
+    target: usize,
 ) -> Result<(Tier, String)> {
     let tier = match options.tier {
         TierChoice::Fixed(tier) => Some(tier),
         TierChoice::Auto => None,
     };
-    let needed = |tier| needed_bytes(options.quality, tier, vertices, triangles);
+    let chunks = Sizes::of(options.chunks, triangles, triangles, target);
+    let needed = |tier| match &chunks {
+        Some(sizes) => bytes_in_chunks(sizes, options.quality, tier, vertices, triangles),
+        None => needed_bytes(options.quality, tier, vertices, triangles),
+    };
     if let (Some(tier), None) = (tier, options.memory_limit_bytes) {
         return Ok((tier, "asked for".into()));
     }
@@ -106,6 +135,7 @@ fn megabytes(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decimate::options::Chunks;
 
     fn chosen(tier: TierChoice, limit: u64) -> Result<Tier> {
         let options = Options {
@@ -113,7 +143,7 @@ mod tests {
             memory_limit_bytes: Some(limit),
             ..Options::default()
         };
-        choose_tier(&options, 500_000, 1_000_000).map(|(tier, _)| tier)
+        choose_tier(&options, 500_000, 1_000_000, 1_000_000).map(|(tier, _)| tier)
     }
 
     /// A million triangles: each limit just at a tier's need takes that tier, one byte less the next.
@@ -127,6 +157,22 @@ mod tests {
         ] {
             assert_eq!(chosen(TierChoice::Auto, needed(tier)).unwrap(), tier);
             assert_eq!(chosen(TierChoice::Auto, needed(tier) - 1).ok(), next);
+        }
+    }
+
+    /// A tenth of a million triangles in chunks takes less than two thirds of what the whole takes in
+    /// the full tier, and in the small one, whose pilot is smaller, less than that.
+    #[test]
+    fn chunks_need_less() {
+        let sizes = Sizes::of(Chunks::Auto, 1_000_000, 1_000_000, 100_000).unwrap();
+        for quality in [Quality::Fast, Quality::Standard] {
+            let [full, small] = [Tier::Full, Tier::Small]
+                .map(|tier| bytes_in_chunks(&sizes, quality, tier, 500_000, 1_000_000));
+            let whole = needed_bytes(quality, Tier::Full, 500_000, 1_000_000);
+            assert!(
+                small < full && 3 * full < 2 * whole,
+                "{small} {full} {whole}"
+            );
         }
     }
 

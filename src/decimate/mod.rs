@@ -85,7 +85,7 @@ pub fn decimate_with_progress(
         return Err(no_triangle_left(triangles_in, &cleaning));
     }
     let (vertices, faces) = (mesh.positions().len(), mesh.triangles().len());
-    let (tier, tier_reason) = memory::choose_tier(options, vertices, faces)?;
+    let (tier, tier_reason) = memory::choose_tier(options, vertices, faces, target_triangles)?;
     let mut report = Report {
         vertices_in,
         triangles_in,

@@ -57,7 +57,7 @@ pub struct Tally {
     pub rejected_lock: usize,
     /// Refusals because of the largest error.
     pub rejected_error: usize,
-    /// The most bytes that the loop's own arrays held at once.
+    /// The most bytes that the loop's own arrays held at once, or the chunks.
     pub working_bytes: usize,
 }
 
@@ -116,7 +116,8 @@ pub struct Report {
     pub tier: Tier,
     /// Why that tier.
     pub tier_reason: String,
-    /// The bytes of the mesh when built: the tier's words, positions and side tables.
+    /// The bytes of the whole mesh when it was built, behind the chunks if there were any: the tier's
+    /// words, positions and side tables.
     pub mesh_bytes: usize,
     /// Chunks that were decimated on their own before the whole; 0 for a small mesh.
     pub chunks: usize,

@@ -186,7 +186,7 @@ impl Fans {
             let next = from_point(fans.ends.map(|e| mesh.tail(e)));
             let side = Side::between(&along, &next);
             let has_area = side.length.greater(Lanes::ZERO);
-            fans.add_outer(&side.normal, Lanes::HALF / side.length & has_area);
+            fans.add_outer(&side.normal, (Lanes::HALF / side.length) & has_area);
             for (sum, x) in fans.numbers[6..].iter_mut().zip(side.normal) {
                 *sum += x;
             }

@@ -545,10 +545,10 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
     pub(super) fn flip_edges(&mut self) {
         for place in 0..self.faces.len() {
             for e in self.faces[place].edges() {
-                if let Some(o) = self.surface.mesh.mate(e).filter(|&o| e < o) {
-                    if self.place_of_face[o.face().index()].is_some() {
-                        self.flip_edge(e, o);
-                    }
+                if let Some(o) = self.surface.mesh.mate(e).filter(|&o| e < o)
+                    && self.place_of_face[o.face().index()].is_some()
+                {
+                    self.flip_edge(e, o);
                 }
             }
         }
