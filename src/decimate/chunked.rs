@@ -68,6 +68,12 @@ const FINEST_STEP: f64 = 1.09;
 /// And by this one at most.
 const COARSEST_STEP: f64 = 4.0;
 
+/// Once less than this share is left, a threshold that rises this many times over and leaves more than
+/// this share of that is as high as it should be: the rest cannot collapse.
+const BEGUN: f64 = 0.9;
+const HOPELESS: f32 = 32.0;
+const STUCK: f64 = 0.97;
+
 /// The chunks whose results wait to be counted, at most.
 const BATCH: usize = 64;
 
@@ -284,6 +290,8 @@ impl Chunked<'_> {
             |chunks: &[Chunk<S, C>]| -> usize { chunks.iter().map(|c| c.greedy.triangles()).sum() };
         let before = triangles(chunks);
         let mut max_cost = 0.0f32;
+        // Where progress was last: the threshold, and what was left.
+        let mut last = (0.0f32, 1.0f64);
         loop {
             // What is left to remove, shared out anew at every step, so that it stops no chunk that has
             // more to remove at this cost than others.
@@ -317,6 +325,12 @@ impl Chunked<'_> {
             let left = left as f64 / all.max(1) as f64;
             if left <= density {
                 return Ok(max_cost);
+            }
+            if left < STUCK * last.1 {
+                last = (max_cost, left);
+            } else if left < BEGUN && max_cost > HOPELESS * last.0 {
+                // What is left is blocked: more would only be taken from where it should stay.
+                return Ok(last.0);
             }
             let step = (left / density).clamp(FINEST_STEP, COARSEST_STEP);
             max_cost = next.max((f64::from(max_cost) * step) as f32);
