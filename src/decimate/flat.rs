@@ -17,6 +17,19 @@ impl FaceFlags {
     /// Of the edge at the first corner; the next two bits are the other edges'.
     const CREASE: u8 = 4;
 
+    /// What lists with one element a face, or directed edge, or none at all, say of face `f`.
+    fn of(f: FaceId, double_sided: &[bool], turned: &[bool], creases: &[bool]) -> Self {
+        let flag = |flags: &[bool], i: usize, bit: u8| {
+            if flags.get(i) == Some(&true) { bit } else { 0 }
+        };
+        let of_face = flag(double_sided, f.index(), Self::DOUBLE_SIDED)
+            | flag(turned, f.index(), Self::TURNED);
+        let edges = f.edges().into_iter().enumerate();
+        Self(edges.fold(of_face, |bits, (k, e)| {
+            bits | flag(creases, e.index(), Self::CREASE << k)
+        }))
+    }
+
     /// Whether the face counts as two.
     pub fn is_double_sided(self) -> bool {
         self.0 & Self::DOUBLE_SIDED != 0
@@ -57,7 +70,14 @@ const LARGEST_WEIGHT: f32 = 1e20;
 impl<V> Flat<V> {
     /// The arrays of a mesh.
     pub fn of(parts: Parts) -> Self {
-        let flags = Self::flags_of(parts.triangles.len(), &parts.double_sided, &[], &[]);
+        let flags = if parts.double_sided.is_empty() {
+            Vec::new()
+        } else {
+            let faces = (0..parts.triangles.len()).map(FaceId::new);
+            faces
+                .map(|f| FaceFlags::of(f, &parts.double_sided, &[], &[]))
+                .collect()
+        };
         let mut flat = Self {
             positions: parts.positions,
             triangles: parts.triangles,
@@ -101,30 +121,6 @@ impl<V> Flat<V> {
     pub fn triangle_count(&self) -> usize {
         let double = self.flags.iter().filter(|f| f.is_double_sided()).count();
         self.triangles.len() + double
-    }
-
-    /// The flags of faces of which some are known to be double-sided, turned round, or to have creases
-    /// as edges; nothing where none is.
-    pub fn flags_of(
-        faces: usize,
-        double_sided: &[bool],
-        turned: &[bool],
-        creases: &[bool],
-    ) -> Vec<FaceFlags> {
-        if double_sided.is_empty() && turned.is_empty() && creases.is_empty() {
-            return Vec::new();
-        }
-        let flag = |flags: &[bool], i: usize, bit: u8| {
-            if flags.get(i) == Some(&true) { bit } else { 0 }
-        };
-        let flags = |f| {
-            let of_face =
-                flag(double_sided, f, FaceFlags::DOUBLE_SIDED) | flag(turned, f, FaceFlags::TURNED);
-            (0..3).fold(of_face, |bits, k| {
-                bits | flag(creases, 3 * f + k, FaceFlags::CREASE << k)
-            })
-        };
-        (0..faces).map(|f| FaceFlags(flags(f))).collect()
     }
 
     /// One flag a face or directed edge: which of them has a bit; nothing where none has, unless all
@@ -182,20 +178,9 @@ impl<V> Flat<V> {
 impl<S: EdgeStore> Surface<S> {
     /// What is known of a face.
     pub fn flags(&self, f: FaceId) -> FaceFlags {
-        let flag = |flags: &[bool], i: usize, bit: u8| {
-            if flags.get(i) == Some(&true) { bit } else { 0 }
-        };
-        let of_face = flag(&self.double_sided, f.index(), FaceFlags::DOUBLE_SIDED)
-            | flag(&self.turned, f.index(), FaceFlags::TURNED);
-        let bits = f
-            .edges()
-            .into_iter()
-            .enumerate()
-            .fold(of_face, |bits, (k, e)| {
-                bits | flag(&self.creases, e.index(), FaceFlags::CREASE << k)
-            });
-        FaceFlags(bits)
+        FaceFlags::of(f, &self.double_sided, &self.turned, &self.creases)
     }
+
     /// The arrays of what is left.
     pub fn into_flat<V>(self) -> Flat<V> {
         let flags = if self.has_flags() {

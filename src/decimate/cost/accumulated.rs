@@ -6,7 +6,7 @@ use wide::f32x4;
 
 use super::form::{Form, Least, Number, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Choice, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
@@ -179,14 +179,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         let along = surface.geometry.between(ends[0], ends[1]);
         let [at_v, at_w] = ends.map(|v| self.quadrics[v.index()].0.map(f64::from));
         let least = least(&at_v, &at_w, along.to_array(), self.placement);
-        let choice = Choice {
-            x_is_better: least.x_is_better,
-            head_is_better: least.head_is_better,
-            energies: [least.at_tail, least.at_head, least.at_x],
-            x: least.x.into(),
-            length_squared: least.length_squared,
-        };
-        choice.evaluation(surface, ends, held, self.placement)
+        least.evaluation(surface, ends, held, self.placement)
     }
 
     #[inline]

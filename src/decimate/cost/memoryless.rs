@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
-use super::{Choice, Cost, Evaluation, LANES, boundary_weight};
+use super::{Cost, Evaluation, LANES, boundary_weight};
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
@@ -213,14 +213,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         let [weight_v, weight_w] = ends.map(|v| surface.weight(v));
         let weight = weight_v.max(weight_w);
         let least = least(&at_v, &at_w, along, dying, weight, DOUBLE);
-        let choice = Choice {
-            x_is_better: least.x_is_better,
-            head_is_better: least.head_is_better,
-            energies: [least.at_tail, least.at_head, least.at_x],
-            x: least.x.into(),
-            length_squared: least.length_squared,
-        };
-        choice.evaluation(surface, ends, held, self.placement)
+        least.evaluation(surface, ends, held, self.placement)
     }
 
     #[inline]

@@ -9,6 +9,7 @@ mod star;
 
 pub use accumulated::Accumulated;
 pub use form::LANES;
+use form::Least;
 pub use memoryless::Memoryless;
 
 use glam::{DVec3, Vec3};
@@ -124,28 +125,16 @@ fn singular_weight<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId, boundary_weight: f64
     }
 }
 
-/// Which of the three places is taken.
-#[derive(Clone, Copy)]
-struct Choice {
-    x_is_better: bool,
-    head_is_better: bool,
-    /// The energies at the tail, at the head and at x.
-    energies: [f64; 3],
-    x: DVec3,
-    length_squared: f64,
-}
-
-impl Choice {
+impl Least<f64> {
     /// The cheapest of both ends and x, of those that may be.
     #[inline(always)]
     fn evaluation<S: EdgeStore>(
-        self,
+        &self,
         surface: &Surface<S>,
         [v, w]: [VertexId; 2],
         held: [bool; 2],
         placement: Placement,
     ) -> Option<Evaluation> {
-        let [at_tail, at_head, at_x] = self.energies;
         let takes_head = match held {
             [true, true] => return None,
             [true, false] => false,
@@ -155,11 +144,11 @@ impl Choice {
         let geometry = &surface.geometry;
         let is_free = held == [false; 2] && placement == Placement::Optimal;
         let (energy, position) = if is_free && self.x_is_better {
-            (at_x, geometry.point_near(v, self.x))
+            (self.at_x, geometry.point_near(v, self.x.into()))
         } else if takes_head {
-            (at_head, geometry.position(w))
+            (self.at_head, geometry.position(w))
         } else {
-            (at_tail, geometry.position(v))
+            (self.at_tail, geometry.position(v))
         };
         let cost = energy.max(0.0) + TIE_BREAK * self.length_squared;
         (cost.is_finite() && position.is_finite()).then_some(Evaluation { cost, position })
