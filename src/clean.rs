@@ -59,15 +59,7 @@ pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
     let kept = used.iter().filter(|&&u| u).count();
     if kept < used.len() {
         counts.dropped_isolated_vertices = used.len() - kept - counts.welded_vertices;
-        let mut new = 0;
-        let renamed: Vec<u32> = used
-            .iter()
-            .map(|&u| {
-                new += u32::from(u);
-                new.wrapping_sub(1)
-            })
-            .collect();
-        rename(&renamed, &mut parts.triangles);
+        rename(&renumbered(&used), &mut parts.triangles);
         retain(&used, &mut parts.positions);
         retain(&used, &mut parts.weights);
     }
@@ -76,15 +68,25 @@ pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
     Ok((IndexedMesh::from_valid(parts), counts))
 }
 
+/// The new number of each element whose flag is set, when only those are kept; of no use for others.
+pub(crate) fn renumbered(keep: &[bool]) -> Vec<u32> {
+    let mut new = 0u32;
+    let number = |&keep: &bool| {
+        new += u32::from(keep);
+        new.wrapping_sub(1)
+    };
+    keep.iter().map(number).collect()
+}
+
 /// Keeps the elements whose flag is set; an empty list stays empty.
-fn retain<T>(keep: &[bool], values: &mut Vec<T>) {
+pub(crate) fn retain<T>(keep: &[bool], values: &mut Vec<T>) {
     let mut keep = keep.iter();
     values.retain(|_| keep.next().is_some_and(|&k| k));
     values.shrink_to_fit();
 }
 
 /// Lets every corner name the new vertex instead of the old.
-fn rename(new: &[u32], triangles: &mut [[u32; 3]]) {
+pub(crate) fn rename(new: &[u32], triangles: &mut [[u32; 3]]) {
     let blocks = triangles.par_chunks_mut(BLOCK);
     blocks.for_each(|block| {
         for v in block.iter_mut().flatten() {

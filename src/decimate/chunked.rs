@@ -23,6 +23,7 @@ use super::options::{Chunks, Options, Topology};
 use super::queue::Buckets;
 use super::report::Tally;
 use super::surface::Surface;
+use crate::clean::{rename, renumbered, retain};
 use crate::error::Result;
 use crate::mesh::{EdgeStore, FaceId, Mesh, Outgoing, VertexId};
 
@@ -693,18 +694,8 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
             }
         }
     }
-    let mut next = 0;
-    let renamed: Vec<u32> = alive
-        .iter()
-        .map(|&alive| {
-            next += u32::from(alive);
-            next.wrapping_sub(1)
-        })
-        .collect();
-    triangles
-        .par_iter_mut()
-        .flatten()
-        .for_each(|v| *v = renamed[*v as usize]);
+    let renamed = renumbered(&alive);
+    rename(&renamed, &mut triangles);
     let lines: Vec<(u32, C::State)> = edges()
         .filter(is_singular)
         .flat_map(|edge| {
@@ -718,14 +709,14 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
             })
         })
         .collect();
-    retain(&mut flat.positions, &alive);
-    retain(&mut flat.locked, &alive);
-    retain(&mut flat.weights, &alive);
-    retain(&mut flat.deviation, &alive);
+    retain(&alive, &mut flat.positions);
+    retain(&alive, &mut flat.locked);
+    retain(&alive, &mut flat.weights);
+    retain(&alive, &mut flat.deviation);
     if is_first {
-        flat.states = vec![C::State::default(); next as usize];
+        flat.states = vec![C::State::default(); flat.positions.len()];
     } else {
-        retain(&mut flat.states, &alive);
+        retain(&alive, &mut flat.states);
     }
     for outcome in outcomes.into_iter().flatten() {
         for kept in outcome.kept {
@@ -741,12 +732,6 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     flat.triangles = triangles;
     flat.flags = flags;
     non_manifold_edges
-}
-
-fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-    let mut keep = keep.iter();
-    values.retain(|_| keep.next().is_some_and(|&keep| keep));
-    values.shrink_to_fit();
 }
 
 fn gather<T: Clone>(values: &[T], ids: &[u32]) -> Vec<T> {
