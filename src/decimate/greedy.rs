@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::cost::{Cost, Evaluation, LANES};
 use super::options::Topology;
-use super::queue::{Candidate, Queue};
+use super::queue::{Age, Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
-use super::surface::{Loss, Merged, Surface};
+use super::surface::{Loss, Merged, Surface, Way};
 use crate::error::{Error, Result};
-use crate::mesh::{Contraction, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
+use crate::mesh::{Disks, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -55,12 +55,6 @@ enum Rejection {
     Error,
 }
 
-/// How a candidate is collapsed.
-enum Way {
-    Collapse,
-    Contract(Contraction, Loss),
-}
-
 /// A part of the surface that hangs together with nothing else.
 struct Component {
     /// What it costs to remove it.
@@ -82,12 +76,10 @@ pub struct Greedy<S, C, Q> {
     edges: Vec<EdgeId>,
     /// And their candidates.
     found: Vec<Candidate>,
-    /// Candidates that have been evaluated.
-    ready: Vec<Candidate>,
-    /// The number of collapses when they were.
-    since: u32,
-    /// What the edges cost that were popped last and are to be evaluated.
-    popped_at: f32,
+    /// The edges that were popped and are to be evaluated.
+    pending: Vec<EdgeId>,
+    /// What they cost, as it was.
+    pending_cost: f32,
     triangles: usize,
     stop: Stop,
     topology: Topology,
@@ -111,9 +103,8 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             changed: Vec::new(),
             edges: Vec::new(),
             found: Vec::new(),
-            ready: Vec::with_capacity(LANES),
-            since: 0,
-            popped_at: 0.0,
+            pending: Vec::with_capacity(LANES),
+            pending_cost: 0.0,
             triangles: surface.triangles(),
             stop: Stop {
                 triangles: 0,
@@ -154,14 +145,17 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                     names.extend(f.edges().into_iter().filter(|&e| mesh.canonical(e) == e));
                 }
                 let mut candidates = Vec::with_capacity(names.len());
-                greedy.evaluate_all(&names, |c| candidates.push(c));
-                candidates.retain(|c| choose(greedy, c));
+                greedy.evaluate_all(&names, |c| {
+                    if choose(greedy, &c) {
+                        candidates.push(c);
+                    }
+                });
                 candidates
             };
             let parts: Vec<Vec<Candidate>> = (0..parts).into_par_iter().map(part).collect();
             for candidate in parts.into_iter().flatten() {
                 is_any = true;
-                self.queue.push(candidate);
+                self.queue.push(candidate, Age::UpToDate);
             }
         }
         is_any
@@ -207,7 +201,6 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     ) -> Result<Halt> {
         self.stop = stop;
         let exact_below = self.cost.exact_below();
-        self.note_bytes();
         let halt = loop {
             if self.triangles <= stop.triangles {
                 break Halt::Target;
@@ -222,7 +215,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 .last()
                 .is_some_and(|c| c.loss.price < candidate.cost)
             {
-                self.queue.push(candidate);
+                self.queue.push(candidate, Age::UpToDate);
                 self.remove_component();
                 continue;
             }
@@ -236,7 +229,8 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 self.queue_at(e, cost);
                 continue;
             }
-            match self.way(e, position) {
+            let disks = self.surface.mesh.disks(e);
+            match self.way(e, disks.as_ref(), position) {
                 Err(Rejection::Link) => {
                     self.tally.rejected_link += 1;
                     self.pinch(&candidate);
@@ -273,9 +267,6 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 }
             }
         };
-        while let Some(candidate) = self.ready.pop() {
-            self.queue.push(candidate);
-        }
         self.note_bytes();
         Ok(halt)
     }
@@ -285,74 +276,61 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     #[inline]
     fn next(&mut self) -> std::result::Result<Candidate, Halt> {
         loop {
-            while let Some(candidate) = self.ready.pop() {
-                if self.is_unchanged(candidate.edge) {
-                    return Ok(candidate);
-                }
-                if self.surface.mesh.is_live_face(candidate.edge.face()) {
-                    self.queue.push(candidate);
-                }
-            }
             let popped = self.queue.pop();
-            let candidate = match popped {
-                Some(candidate) if candidate.cost <= self.stop.max_cost => candidate,
+            // What waits for its evaluation comes before what costs more than it did.
+            let limit = if self.pending.is_empty() {
+                self.stop.max_cost
+            } else {
+                self.pending_cost
+            };
+            let (candidate, age) = match popped {
+                Some((candidate, age)) if candidate.cost <= limit => (candidate, age),
                 _ => {
-                    popped.into_iter().for_each(|c| self.queue.push(c));
-                    if !self.edges.is_empty() {
-                        self.evaluate_ready();
-                        continue;
+                    if let Some((candidate, age)) = popped {
+                        self.queue.push(candidate, age);
                     }
-                    return Err(popped.map_or(Halt::Empty, |c| Halt::Cost(c.cost)));
+                    if self.pending.is_empty() {
+                        return Err(popped.map_or(Halt::Empty, |(c, _)| Halt::Cost(c.cost)));
+                    }
+                    self.evaluate_pending();
+                    continue;
                 }
             };
             let e = candidate.edge;
-            if !self.surface.mesh.is_live_face(e.face()) || self.goes_by_another_name(e) {
+            debug_assert!(self.surface.mesh.is_live_face(e.face()), "{e:?} is dead");
+            if !C::IS_LAZY && self.goes_by_another_name(e) {
                 continue;
             }
-            if !C::IS_LAZY {
+            if age == Age::UpToDate {
                 return Ok(candidate);
             }
-            self.edges.push(e);
-            self.popped_at = candidate.cost;
-            if self.edges.len() == LANES || !self.queue.has_at_most(candidate.cost) {
-                self.evaluate_ready();
+            self.pending.push(e);
+            self.pending_cost = candidate.cost;
+            if self.pending.len() == LANES {
+                self.evaluate_pending();
             }
         }
     }
 
-    /// Evaluates the edges that were popped: those that cost as much are ready, the others go back.
+    /// Evaluates the edges that were popped, and queues them at what they cost now.
     #[inline]
-    fn evaluate_ready(&mut self) {
-        let cost = self.popped_at;
-        let mut edges = std::mem::take(&mut self.edges);
+    fn evaluate_pending(&mut self) {
+        let mut pending = std::mem::take(&mut self.pending);
         let mut found = std::mem::take(&mut self.found);
-        self.evaluate_all(&edges, |candidate| found.push(candidate));
+        // Some may have gone since.
+        pending.retain(|e| self.surface.mesh.is_live_face(e.face()));
+        self.evaluate_all(&pending, |candidate| found.push(candidate));
         for candidate in found.drain(..) {
-            if candidate.cost > cost * RISE {
-                self.queue.push(candidate);
-            } else {
-                let edge = candidate.edge;
-                self.ready.push(Candidate { cost, edge });
-            }
+            self.queue.push(candidate, Age::UpToDate);
         }
-        edges.clear();
-        self.since = self.tally.collapses as u32;
-        (self.edges, self.found) = (edges, found);
+        pending.clear();
+        (self.pending, self.found) = (pending, found);
     }
 
-    /// Whether nothing has changed at either end since the edges that are ready were evaluated.
-    #[inline]
-    fn is_unchanged(&self, e: EdgeId) -> bool {
-        let mesh = &self.surface.mesh;
-        let is_before = |v: VertexId| self.changed_at[v.index()] <= self.since;
-        mesh.is_live_face(e.face()) && mesh.edge_vertices(e).into_iter().all(is_before)
-    }
-
-    /// Queues the edges at a merged vertex that have no candidate, at the cost of now, which is a
-    /// lower bound.
+    /// Outdates the candidates of the edges at a merged vertex, and queues those that have none, at the
+    /// cost of now, which is a lower bound.
     #[inline]
     fn complete(&mut self, v: VertexId, cost: f32) {
-        self.changed_at[v.index()] = self.tally.collapses as u32;
         let mut edges = std::mem::take(&mut self.edges);
         let mesh = &self.surface.mesh;
         for start in mesh.fans(v) {
@@ -360,9 +338,15 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             for e in mesh.fan(start) {
                 let before = mesh.prev(e);
                 let is_queued = match mesh.opposite(e) {
-                    Opposite::Edge(o) => self.queue.contains(e) || self.queue.contains(o),
-                    Opposite::Boundary => self.queue.contains(e),
-                    Opposite::NonManifold(_) => self.queue.contains(mesh.canonical(e)),
+                    Opposite::Edge(o) => {
+                        let are_queued = [self.queue.outdate(e), self.queue.outdate(o)];
+                        if are_queued == [true; 2] {
+                            self.queue.remove(e.max(o));
+                        }
+                        are_queued != [false; 2]
+                    }
+                    Opposite::Boundary => self.queue.outdate(e),
+                    Opposite::NonManifold(_) => self.queue.outdate(mesh.canonical(e)),
                 };
                 if !is_queued {
                     edges.push(mesh.canonical(e));
@@ -370,14 +354,12 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 end = Some(before);
             }
             let end = end.filter(|&end| mesh.mate(end).is_none());
-            edges.extend(
-                end.map(|end| mesh.canonical(end))
-                    .filter(|&e| !self.queue.contains(e)),
-            );
+            let end = end.map(|end| mesh.canonical(end));
+            edges.extend(end.filter(|&e| !self.queue.outdate(e)));
         }
         for edge in edges.drain(..) {
             if self.surface.held(edge) != [true; 2] {
-                self.queue.push(Candidate { cost, edge });
+                self.queue.push(Candidate { cost, edge }, Age::OutOfDate);
             }
         }
         self.edges = edges;
@@ -470,7 +452,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
 
     fn queue_at(&mut self, edge: EdgeId, cost: f64) {
         let cost = cost as f32;
-        self.queue.push(Candidate { cost, edge });
+        self.queue.push(Candidate { cost, edge }, Age::UpToDate);
     }
 
     /// Whether `e` is not the name of its edge, and the edge has a candidate by its name: its costs
@@ -481,18 +463,27 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         name != e && self.queue.contains(name)
     }
 
-    /// How `e` can be collapsed to `position` and the deviation after it, or why it cannot.
+    /// How `e` can be collapsed to `position`, with what the mesh says of its [disks](crate::mesh::Mesh::disks), and the deviation after it, or why it cannot.
     #[inline]
-    fn way(&self, e: EdgeId, position: Vec3) -> std::result::Result<(Way, f32), Rejection> {
+    fn way<'a>(
+        &self,
+        e: EdgeId,
+        disks: Option<&'a Disks>,
+        position: Vec3,
+    ) -> std::result::Result<(Way<'a>, f32), Rejection> {
         let mesh = &self.surface.mesh;
-        let way = if mesh.link_condition(e) && self.surface.crease_condition(e) {
-            Way::Collapse
+        let keeps_topology = match disks {
+            Some(disks) => disks.link_condition(),
+            None => mesh.link_condition(e),
+        };
+        let way = if keeps_topology && self.surface.crease_condition(e) {
+            Way::Collapse(disks)
         } else {
             self.contraction(e).ok_or(Rejection::Link)?
         };
         let deviation = self
             .surface
-            .deviation_after(e, position)
+            .deviation_after(e, &way, position)
             .ok_or(Rejection::Flip)?;
         if self
             .stop
@@ -506,7 +497,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     }
 
     /// The contraction of `e`, where the topology may change; none that would leave nothing.
-    fn contraction(&self, e: EdgeId) -> Option<Way> {
+    fn contraction(&self, e: EdgeId) -> Option<Way<'static>> {
         if !self.may_simplify() {
             return None;
         }
@@ -537,6 +528,9 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             && !faces.iter().any(has_locked);
         if is_allowed {
             self.surface.mesh.remove_component(&faces);
+            for e in faces.iter().flat_map(|f| f.edges()) {
+                self.queue.remove(e);
+            }
             self.surface.lost = self.surface.lost.max(component.loss.reach);
             self.triangles -= triangles;
             self.tally.removed_components += 1;
@@ -614,21 +608,19 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
 
     fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f32) -> Merged {
         let mesh = &self.surface.mesh;
-        let ends = mesh.edge_vertices(e);
-        let apexes = mesh.edge_star(e).into_iter().map(|d| mesh.apex(d));
-        let mut touched = ends.into_iter().chain(apexes);
-        if touched.any(|v| mesh.is_non_manifold_vertex(v)) {
-            self.tally.collapses_non_manifold += 1;
-        }
-        let contraction = match way {
-            Way::Collapse => None,
-            Way::Contract(contraction, loss) => {
-                self.tally.contractions += 1;
-                self.surface.lost = self.surface.lost.max(loss.reach);
-                Some(contraction)
+        if mesh.non_manifold_edge_count() + mesh.multi_fan_vertex_count() > 0 {
+            let ends = mesh.edge_vertices(e);
+            let apexes = mesh.edge_star(e).into_iter().map(|d| mesh.apex(d));
+            let mut touched = ends.into_iter().chain(apexes);
+            if touched.any(|v| mesh.is_non_manifold_vertex(v)) {
+                self.tally.collapses_non_manifold += 1;
             }
-        };
-        let merged = self.surface.collapse(e, position, contraction, deviation);
+        }
+        if let Way::Contract(_, loss) = way {
+            self.tally.contractions += 1;
+            self.surface.lost = self.surface.lost.max(loss.reach);
+        }
+        let merged = self.surface.collapse(e, position, way, deviation);
         if self.topology == Topology::Simplify {
             self.free_faces.extend(&merged.collapse.dead_faces);
             self.free_vertices.push(merged.collapse.removed);
@@ -637,12 +629,16 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                     let mut found = None;
                     let name = self.surface.mesh.canonical(e);
                     self.evaluate_all(&[name], |c| found = Some(c));
-                    found.into_iter().for_each(|c| self.queue.push(c));
+                    found
+                        .into_iter()
+                        .for_each(|c| self.queue.push(c, Age::UpToDate));
                 }
             }
         }
-        let dead = merged.collapse.dead_faces.iter();
-        self.triangles -= dead.map(|&f| self.surface.sides(f)).sum::<usize>();
+        for &dead in &merged.collapse.dead_faces {
+            self.triangles -= self.surface.sides(dead);
+            dead.edges().into_iter().for_each(|e| self.queue.remove(e));
+        }
         self.tally.collapses += 1;
         merged
     }
@@ -675,7 +671,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.evaluate_all(&edges, |candidate| found.push(candidate));
         found
             .drain(..)
-            .for_each(|candidate| self.queue.push(candidate));
+            .for_each(|candidate| self.queue.push(candidate, Age::UpToDate));
         edges.clear();
         (self.edges, self.found) = (edges, found);
     }
@@ -695,7 +691,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.queue_all(|greedy, c| {
             greedy
                 .evaluate(c.edge)
-                .is_some_and(|e| greedy.way(c.edge, e.position).is_ok())
+                .is_some_and(|e| greedy.way(c.edge, None, e.position).is_ok())
         })
     }
 
@@ -709,7 +705,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             let Some(Evaluation { position, .. }) = self.evaluate(e) else {
                 continue;
             };
-            match self.way(e, position) {
+            match self.way(e, None, position) {
                 Err(Rejection::Link) => blocked.link += 1,
                 Err(Rejection::Flip) => blocked.flip += 1,
                 Err(Rejection::Error) => blocked.error += 1,

@@ -4,7 +4,7 @@ use glam::Vec3;
 use wide::f32x4;
 
 use super::geometry::Geometry;
-use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
+use crate::mesh::{Disks, EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
 /// A face this thin (twice its area against its longest squared edge) has no direction that single
 /// precision could vouch for.
@@ -30,6 +30,7 @@ pub fn distance_from_star<S: EdgeStore>(
 ) -> Option<f32> {
     let [v, w] = mesh.edge_vertices(e);
     let mut faces = Faces::new(geometry);
+    let mut from_lines = 0.0f32;
     for (end, other) in [(v, w), (w, v)] {
         let point = geometry.position(end);
         if point == position {
@@ -56,10 +57,43 @@ pub fn distance_from_star<S: EdgeStore>(
                 last = (before, apex);
             }
             faces.look()?;
-            faces.squared = faces.squared.max(at_first).max(from_line(last.0, last.1));
+            from_lines = from_lines.max(at_first).max(from_line(last.0, last.1));
         }
     }
-    Some(faces.squared.sqrt())
+    Some(faces.farthest().max(from_lines.sqrt()))
+}
+
+/// [`distance_from_star`] of an edge between two disks.
+#[inline]
+pub fn distance_from_disks(geometry: &Geometry, disks: &Disks, position: Vec3) -> Option<f32> {
+    let mut faces = Faces::new(geometry);
+    let [v, w] = disks.ends();
+    let [x, y] = disks.apexes();
+    let mut has_seen_dying = false;
+    for (side, end, other, last) in [(0, v, w, y), (1, w, v, x)] {
+        let point = geometry.position(end);
+        if point == position {
+            continue;
+        }
+        let mut around = disks.around(side).iter();
+        let offset = geometry.scaled(position - point);
+        if has_seen_dying {
+            let first = around.next().map_or(last, |&first| first);
+            faces.begin(point, offset, geometry.position(first), false);
+        } else {
+            faces.begin(point, offset, geometry.position(other), true);
+        }
+        for &v in around {
+            faces.add(geometry.position(v), false)?;
+        }
+        faces.add(geometry.position(last), false)?;
+        if !has_seen_dying {
+            faces.add(geometry.position(other), true)?;
+        }
+        faces.look()?;
+        has_seen_dying = true;
+    }
+    Some(faces.farthest())
 }
 
 fn distance_squared_from_line(along: Vec3, offset: Vec3) -> f32 {
@@ -77,77 +111,97 @@ struct Faces {
     point: Vec3,
     offset: Vec3,
     scale: f32,
-    /// From the vertex to those on the rim, in the unit box; and 1 where the one on the rim is the
-    /// edge's other end, so that the faces there go, else 0.
-    rim: [[f32; 4]; GATHERED + 1],
+    /// The coordinates of the vertices on the rim; and 1 where the vertex is the edge's other end, so
+    /// that the faces there go, else 0.
+    rim: [[f32; GATHERED + LANES]; 4],
     count: usize,
-    /// The largest squared distance from their planes so far.
-    squared: f32,
+    /// The largest squared distance from their planes so far, in each lane.
+    squared: f32x4,
 }
 
 impl Faces {
-    #[inline]
+    #[inline(always)]
     fn new(geometry: &Geometry) -> Self {
         Self {
             point: Vec3::ZERO,
             offset: Vec3::ZERO,
             scale: geometry.scale() as f32,
-            rim: [[0.0; 4]; GATHERED + 1],
+            rim: [[0.0; GATHERED + LANES]; 4],
             count: 0,
-            squared: 0.0,
+            squared: f32x4::ZERO,
         }
     }
 
-    #[inline]
-    fn place(&self, position: Vec3, is_other: bool) -> [f32; 4] {
-        let [x, y, z] = ((position - self.point) * self.scale).to_array();
-        [x, y, z, if is_other { 1.0 } else { 0.0 }]
+    #[inline(always)]
+    fn put(&mut self, i: usize, position: Vec3, is_other: bool) {
+        let i = i.min(GATHERED);
+        self.rim[0][i] = position.x;
+        self.rim[1][i] = position.y;
+        self.rim[2][i] = position.z;
+        self.rim[3][i] = if is_other { 1.0 } else { 0.0 };
     }
 
     /// A fan around a vertex at `point` that moves by `offset`, and the first vertex on its rim.
-    #[inline]
+    #[inline(always)]
     fn begin(&mut self, point: Vec3, offset: Vec3, position: Vec3, is_other: bool) {
         (self.point, self.offset, self.count) = (point, offset, 0);
-        self.rim[0] = self.place(position, is_other);
+        self.put(0, position, is_other);
     }
 
     /// The next vertex on the rim, and so a face. Nothing where one before it turns.
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, position: Vec3, is_other: bool) -> Option<()> {
         if self.count == GATHERED {
             self.look()?;
-            self.rim[0] = self.rim[GATHERED];
+            for numbers in &mut self.rim {
+                numbers[0] = numbers[GATHERED];
+            }
             self.count = 0;
         }
-        let place = self.place(position, is_other);
         self.count += 1;
-        self.rim[self.count.min(GATHERED)] = place;
+        self.put(self.count, position, is_other);
         Some(())
+    }
+
+    /// Four vertices of the rim, as seen from the point, in the unit box; and the marks.
+    #[inline(always)]
+    fn vertices(&self, first: usize) -> [f32x4; 4] {
+        let [x, y, z] = self.point.to_array();
+        let four = |k: usize| f32x4::new(*self.rim[k][first..].first_chunk().expect("as many"));
+        let from = |k, origin| (four(k) - f32x4::splat(origin)) * f32x4::splat(self.scale);
+        [from(0, x), from(1, y), from(2, z), four(3)]
+    }
+
+    /// The largest distance from the planes of those looked at.
+    #[inline(always)]
+    fn farthest(&self) -> f32 {
+        let [p, q, r, s] = self.squared.to_array();
+        p.max(q).max(r.max(s)).sqrt()
     }
 
     /// Looks at the faces gathered. Nothing where one turns.
     #[inline]
     fn look(&mut self) -> Option<()> {
-        // The lanes behind the last face hold faces without area.
-        let [x, y, z, _] = self.rim[self.count];
-        let padded = self.count.next_multiple_of(LANES);
-        for i in self.count + 1..=padded {
-            self.rim[i] = [x, y, z, 1.0];
+        // The lanes behind the last face hold faces that go.
+        let last = self.count.min(GATHERED);
+        for numbers in &mut self.rim[..3] {
+            let number = numbers[last];
+            numbers[last + 1..last + LANES].fill(number);
         }
-        for first in (0..padded).step_by(LANES) {
-            let [a, b, c, d, e] = *self.rim[first..].first_chunk().expect("as many");
-            let from = f32x4::transpose([a, b, c, d].map(f32x4::new));
-            let to = f32x4::transpose([b, c, d, e].map(f32x4::new));
-            self.squared = self.squared.max(distance_squared(&from, &to, self.offset)?);
+        self.rim[3][last + 1..last + LANES].fill(1.0);
+        for first in (0..last).step_by(LANES) {
+            let (from, to) = (self.vertices(first), self.vertices(first + 1));
+            let squared = distance_squared(&from, &to, self.offset)?;
+            self.squared = self.squared.fast_max(squared);
         }
         Some(())
     }
 }
 
-/// The largest squared distance of the place that the vertex moves to, by `offset`, from the planes
-/// of the faces between it and `from` and `to`; nothing where one of the faces turns.
-#[inline]
-fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<f32> {
+/// The squared distances of the place that the vertex moves to, by `offset`, from the planes of the
+/// faces between it and `from` and `to`; nothing where one of the faces turns.
+#[inline(always)]
+fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<f32x4> {
     let ([ax, ay, az, a_is_other], [bx, by, bz, b_is_other]) = (*from, *to);
     let (a, b) = ([ax, ay, az], [bx, by, bz]);
     let offset = offset.to_array().map(f32x4::splat);
@@ -169,9 +223,7 @@ fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<
         | is_thin(dot(&after, &after), &a_after, &b_after);
     let stays = (a_is_other + b_is_other).simd_eq(f32x4::ZERO);
     let had_shape = !is_thin(area_squared, &a, &b);
-    let [p, q, r, s] = squared.to_array();
-    let largest = p.max(q).max(r.max(s));
-    (!(turns & stays & had_shape).any()).then_some(largest)
+    (!(turns & stays & had_shape).any()).then_some(squared)
 }
 
 #[inline(always)]

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::geometry::Geometry;
 use super::options::{Boundary, Options};
 use super::rules;
-use crate::mesh::{Collapse, Contraction, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
+use crate::mesh::{Collapse, Contraction, Disks, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 
 /// A collapse, and where its ends were.
 pub struct Merged {
@@ -16,6 +16,14 @@ pub struct Merged {
     pub from: [Vec3; 2],
     /// The vertices around that may have lost faces, too, where it was no mere collapse.
     pub around: Vec<VertexId>,
+}
+
+/// How an edge is collapsed.
+pub enum Way<'a> {
+    /// With all its faces; where it lies between two disks, with what lies around it.
+    Collapse(Option<&'a Disks>),
+    /// As this says, which changes the topology and costs so much.
+    Contract(Contraction, Loss),
 }
 
 /// What a change of the topology costs.
@@ -196,16 +204,9 @@ impl<S: EdgeStore> Surface<S> {
         !star.any(|d| self.is_curve(self.mesh.next(d)) && self.is_curve(self.mesh.prev(d)))
     }
 
-    /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried; by a
-    /// contraction, if one is given. `deviation` is what [`deviation_after`](Self::deviation_after)
-    /// said.
-    pub fn collapse(
-        &mut self,
-        e: EdgeId,
-        position: Vec3,
-        contraction: Option<&Contraction>,
-        deviation: f32,
-    ) -> Merged {
+    /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried.
+    /// `deviation` is what [`deviation_after`](Self::deviation_after) said.
+    pub fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f32) -> Merged {
         let from = self
             .mesh
             .edge_vertices(e)
@@ -218,9 +219,9 @@ impl<S: EdgeStore> Surface<S> {
             let star = self.mesh.edge_star(e).into_iter();
             star.filter(has_crease).map(EdgeId::face).collect()
         };
-        let (collapse, around) = match contraction {
-            None => (self.mesh.collapse(e), Vec::new()),
-            Some(contraction) => (
+        let (collapse, around) = match way {
+            Way::Collapse(disks) => (self.mesh.collapse_between(e, *disks), Vec::new()),
+            Way::Contract(contraction, _) => (
                 self.mesh.contract(contraction),
                 contraction.around().to_vec(),
             ),
@@ -353,13 +354,16 @@ impl<S: EdgeStore> Surface<S> {
     /// memoryless cost forgets, so each vertex carries the sum of what its collapses moved away from
     /// the planes at hand.
     #[inline]
-    pub fn deviation_after(&self, e: EdgeId, position: Vec3) -> Option<f32> {
-        let [v, w] = self
-            .mesh
-            .edge_vertices(e)
-            .map(|v| self.deviation[v.index()]);
-        let moved = rules::distance_from_star(&self.mesh, &self.geometry, e, position)?;
-        Some(v.max(w) + moved)
+    pub fn deviation_after(&self, e: EdgeId, way: &Way, position: Vec3) -> Option<f32> {
+        let [v, w] = self.mesh.edge_vertices(e);
+        let deviation = self.deviation[v.index()].max(self.deviation[w.index()]);
+        let moved = match way {
+            Way::Collapse(Some(disks)) => {
+                rules::distance_from_disks(&self.geometry, disks, position)
+            }
+            _ => rules::distance_from_star(&self.mesh, &self.geometry, e, position),
+        };
+        Some(deviation + moved?)
     }
 
     /// The largest estimated distance from the original, in the unit box.

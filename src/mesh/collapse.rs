@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use super::disk::Disks;
 use super::link::{Opposite, Outgoing};
 use super::{EdgeId, EdgeStore, FaceId, Mesh, OppositeWord, VertexId};
 
@@ -47,8 +48,10 @@ impl<S: EdgeStore> Mesh<S> {
     /// Costs one walk around each end.
     #[inline]
     pub fn link_condition(&self, e: EdgeId) -> bool {
-        self.link_condition_of_disks(e)
-            .unwrap_or_else(|| self.general_link_condition(e))
+        match self.disks(e) {
+            Some(disks) => disks.link_condition(),
+            None => self.general_link_condition(e),
+        }
     }
 
     /// [`link_condition`](Self::link_condition), of any edge.
@@ -187,12 +190,19 @@ impl<S: EdgeStore> Mesh<S> {
     ///
     /// Needs [`link_condition(e)`](Self::link_condition). Costs a walk around both ends.
     pub fn collapse(&mut self, e: EdgeId) -> Collapse {
+        let disks = self.disks(e);
+        self.collapse_between(e, disks.as_ref())
+    }
+
+    /// [`collapse`](Self::collapse) with what [`disks`](Self::disks) says of `e`.
+    #[inline]
+    pub fn collapse_between(&mut self, e: EdgeId, disks: Option<&Disks>) -> Collapse {
         debug_assert!(
             self.link_condition(e),
             "collapse of {e:?} would change the topology"
         );
-        match self.collapse_disks(e) {
-            Some(collapse) => collapse,
+        match disks {
+            Some(disks) => self.collapse_disks(disks),
             None => self.general_collapse(e),
         }
     }

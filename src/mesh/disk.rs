@@ -7,72 +7,116 @@ use super::collapse::Collapse;
 use super::link::Outgoing;
 use super::{EdgeId, EdgeStore, Mesh, OppositeWord, VertexId};
 
-/// The most neighbours of an end that are compared; two more are not. Hardly a vertex of a mesh in
+/// The most neighbours of an end that are looked at; two more are not. Hardly a vertex of a mesh in
 /// decimation has more, and 12 would take the same time.
 const FEW: usize = 16;
 
+/// An edge between two disks of few neighbours, and what lies around it. No edge between two faces
+/// that lie on each other.
+///
+/// ```text
+///         y
+///      ↗  o  ↘           around u: x and on, to before y
+///     u ──────→ v        around v: y and on, to before x
+///      ↘  e  ↗
+///         x
+/// ```
+pub struct Disks {
+    /// e and o.
+    sides: [EdgeId; 2],
+    ends: [VertexId; 2],
+    /// The edges that leave each end for the vertices around it.
+    leaving: [[EdgeId; FEW]; 2],
+    /// The vertices around each end; places left over name the end itself.
+    around: [[VertexId; FEW]; 2],
+    counts: [usize; 2],
+}
+
+impl Disks {
+    /// The tail and the head of the edge.
+    #[inline(always)]
+    pub fn ends(&self) -> [VertexId; 2] {
+        self.ends
+    }
+
+    /// The vertices around the tail (0) or the head (1), in the order of the walk, without the other
+    /// end and the apex before it.
+    #[inline(always)]
+    pub fn around(&self, end: usize) -> &[VertexId] {
+        &self.around[end][..self.counts[end].min(FEW)]
+    }
+
+    /// The apexes of the edge's two faces: what comes first around the tail, and around the head.
+    #[inline(always)]
+    pub fn apexes(&self) -> [VertexId; 2] {
+        [self.around[0][0], self.around[1][0]]
+    }
+
+    /// The [link condition](Mesh::link_condition).
+    #[inline(always)]
+    pub fn link_condition(&self) -> bool {
+        let [around_u, _] = &self.around;
+        let is_around_u = |z| around_u.iter().fold(false, |any, &x| any | (x == z));
+        let around_v = self.around(1).iter();
+        let is_common = around_v.fold(false, |any, &z| any | is_around_u(z));
+        let is_tetrahedron = self.counts[0].max(self.counts[1]) == 1;
+        !is_common && !is_tetrahedron
+    }
+}
+
 impl<S: EdgeStore> Mesh<S> {
-    /// The [link condition](Self::link_condition) of an edge between two disks of few neighbours;
-    /// nothing of another edge.
+    /// What lies around an edge between two disks of few neighbours; nothing of another edge.
     ///
-    /// ```text
-    ///         y
-    ///      ↗  o  ↘           around u: from u→x to before u→y
-    ///     u ──────→ v        around v: from v→y to before v→x
-    ///      ↘  e  ↗
-    ///         x
-    /// ```
+    /// Costs one walk around both ends.
     #[inline]
-    pub(super) fn link_condition_of_disks(&self, e: EdgeId) -> Option<bool> {
+    pub fn disks(&self, e: EdgeId) -> Option<Disks> {
         let o = self.mate(e)?;
         let [u, v] = self.edge_vertices(e);
         if !self.has_one_fan(u) || !self.has_one_fan(v) {
             return None;
         }
+        let mut disks = Disks {
+            sides: [e, o],
+            ends: [u, v],
+            leaving: [[e; FEW]; 2],
+            around: [[u; FEW], [v; FEW]],
+            counts: [0; 2],
+        };
         let (mut at_u, mut at_v) = (self.step(e)?, self.step(o)?);
         let (end_u, end_v) = (self.next(o), self.next(e));
-        let are_on_each_other = at_u == end_u;
-        // Places left over name the vertex itself, which is on neither way.
-        let (mut around_u, mut around_v) = ([u; FEW], [v; FEW]);
-        let (mut of_u, mut of_v) = (around_u.iter_mut(), around_v.iter_mut());
+        let (mut count_u, mut count_v) = (0, 0);
+        let [leaving_u, leaving_v] = &mut disks.leaving;
+        let [around_u, around_v] = &mut disks.around;
         // Both ways at once: each step waits for the one before it, but not for the other way's.
         while at_u != end_u && at_v != end_v {
-            (*of_u.next()?, *of_v.next()?) = (self.head(at_u), self.head(at_v));
+            (*leaving_u.get_mut(count_u)?, around_u[count_u]) = (at_u, self.head(at_u));
+            (*leaving_v.get_mut(count_v)?, around_v[count_v]) = (at_v, self.head(at_v));
+            (count_u, count_v) = (count_u + 1, count_v + 1);
             (at_u, at_v) = (self.step(at_u)?, self.step(at_v)?);
         }
         while at_u != end_u {
-            *of_u.next()? = self.head(at_u);
+            (*leaving_u.get_mut(count_u)?, around_u[count_u]) = (at_u, self.head(at_u));
+            count_u += 1;
             at_u = self.step(at_u)?;
         }
         while at_v != end_v {
-            *of_v.next()? = self.head(at_v);
+            (*leaving_v.get_mut(count_v)?, around_v[count_v]) = (at_v, self.head(at_v));
+            count_v += 1;
             at_v = self.step(at_v)?;
         }
-        let (left_u, left_v) = (of_u.len(), of_v.len());
-        let is_around_u = |z| around_u.iter().fold(false, |any, &x| any | (x == z));
-        let around_v = around_v[..FEW - left_v].iter();
-        let is_common = around_v.fold(false, |any, &z| any | is_around_u(z));
-        let is_tetrahedron = left_u.min(left_v) == FEW - 1 && !are_on_each_other;
-        Some(!is_common && !is_tetrahedron)
+        disks.counts = [count_u, count_v];
+        // Two faces on each other have nothing else around them.
+        (count_u > 0 && count_v > 0).then_some(disks)
     }
 
-    /// [Collapses](Self::collapse) an edge between two disks; does nothing to another edge.
+    /// [Collapses](Self::collapse) an edge between two disks.
     #[inline]
-    pub(super) fn collapse_disks(&mut self, e: EdgeId) -> Option<Collapse> {
-        let o = self.mate(e)?;
-        let [removed, kept] = self.edge_vertices(e);
-        if !self.is_disk(removed) || !self.is_disk(kept) {
-            return None;
-        }
-        let (first, last) = (self.step(e)?, self.next(o));
-        // Two faces on each other are no disks.
-        if first == last {
-            return None;
-        }
-        let mut at = first;
-        while at != last {
-            self.store.set_tail(at, kept);
-            at = self.step(at).expect("the fan of a disk is closed");
+    pub(super) fn collapse_disks(&mut self, disks: &Disks) -> Collapse {
+        let [e, o] = disks.sides;
+        let [removed, kept] = disks.ends;
+        let first = disks.leaving[0][0];
+        for &leaving in &disks.leaving[0][..disks.counts[0].min(FEW)] {
+            self.store.set_tail(leaving, kept);
         }
         let merged_edges = [e, o].map(|d| self.close_face(d));
         let dead_faces = [e, o].map(EdgeId::face);
@@ -83,12 +127,12 @@ impl<S: EdgeStore> Mesh<S> {
         self.live_vertices -= 1;
         self.set_outgoing(removed, Outgoing::None);
         self.set_outgoing(kept, Outgoing::Fan(first));
-        Some(Collapse {
+        Collapse {
             kept,
             removed,
             dead_faces: SmallVec::from_buf(dead_faces),
             merged_edges: SmallVec::from_buf(merged_edges),
-        })
+        }
     }
 
     /// The edge behind `e` in the fan of its tail, of which the last has none.
@@ -100,11 +144,5 @@ impl<S: EdgeStore> Mesh<S> {
     #[inline(always)]
     fn has_one_fan(&self, v: VertexId) -> bool {
         matches!(self.outgoing(v), Outgoing::Fan(_))
-    }
-
-    /// Whether `v` has one fan, and it is closed.
-    #[inline(always)]
-    fn is_disk(&self, v: VertexId) -> bool {
-        matches!(self.outgoing(v), Outgoing::Fan(start) if self.mate(start).is_some())
     }
 }

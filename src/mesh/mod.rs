@@ -33,6 +33,7 @@ mod tests;
 pub use collapse::Collapse;
 pub use compact::Compaction;
 pub use contract::Contraction;
+pub use disk::Disks;
 pub use ids::{EdgeId, FaceId, VertexId};
 pub use link::{Opposite, Outgoing, RowId};
 pub use orient::{Oriented, turn_round};

@@ -73,25 +73,43 @@ pub struct Accumulated {
 
 /// The coordinates of vertices.
 #[inline(always)]
-fn places<S: EdgeStore>(surface: &Surface<S>, vertices: &[VertexId; LANES]) -> [f32x4; 3] {
+fn places<S: EdgeStore>(surface: &Surface<S>, [a, b, c, d]: [VertexId; LANES]) -> [f32x4; 3] {
     let place = |v| {
         let [x, y, z] = surface.geometry.position(v).to_array();
         f32x4::new([x, y, z, 0.0])
     };
-    let [x, y, z, _] = f32x4::transpose(vertices.map(place));
+    let [x, y, z, _] = f32x4::transpose([place(a), place(b), place(c), place(d)]);
     [x, y, z]
 }
 
+/// Four of a quadric's numbers.
+#[inline(always)]
+fn part(quadric: &Quadric, first: usize) -> f32x4 {
+    f32x4::new(*quadric.0[first..].first_chunk().expect("ten numbers"))
+}
+
 impl Accumulated {
+    /// The numbers of a vertex's quadric.
+    #[inline(always)]
+    fn doubles(&self, v: VertexId) -> [f64; 10] {
+        let mut numbers = [0.0; 10];
+        for (double, &single) in numbers.iter_mut().zip(&self.quadrics[v.index()].0) {
+            *double = single.into();
+        }
+        numbers
+    }
+
     /// The numbers of vertices' quadrics.
     #[inline(always)]
-    fn numbers(&self, vertices: &[VertexId; LANES]) -> [f32x4; 10] {
-        let quadrics = vertices.map(|v| &self.quadrics[v.index()].0);
-        let [first, second, third] = [0, 4, 6].map(|i| {
-            let part = |q: &[f32; 10]| f32x4::new(*q[i..].first_chunk().expect("ten numbers"));
-            f32x4::transpose(quadrics.map(part))
-        });
-        let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (first, second, third);
+    fn numbers(&self, [a, b, c, d]: [VertexId; LANES]) -> [f32x4; 10] {
+        let [p, q, r, s] = [
+            &self.quadrics[a.index()],
+            &self.quadrics[b.index()],
+            &self.quadrics[c.index()],
+            &self.quadrics[d.index()],
+        ];
+        let parts = |i| f32x4::transpose([part(p, i), part(q, i), part(r, i), part(s, i)]);
+        let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (parts(0), parts(4), parts(6));
         [a, b, c, d, e, f, g, h, i, j]
     }
 }
@@ -175,22 +193,24 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
 
     #[inline]
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
-        let ends = surface.mesh.edge_vertices(e);
-        let along = surface.geometry.between(ends[0], ends[1]);
-        let [at_v, at_w] = ends.map(|v| self.quadrics[v.index()].0.map(f64::from));
-        let least = least(&at_v, &at_w, along.to_array(), self.placement);
-        least.evaluation(surface, ends, held, self.placement)
+        let [v, w] = surface.mesh.edge_vertices(e);
+        let along = surface.geometry.between(v, w).to_array();
+        let (at_v, at_w) = (self.doubles(v), self.doubles(w));
+        let least = least(&at_v, &at_w, along, self.placement);
+        least.evaluation(surface, [v, w], held, self.placement)
     }
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
-        let ends = edges.map(|e| surface.mesh.edge_vertices(e));
-        let (tails, heads) = (ends.map(|[v, _]| v), ends.map(|[_, w]| w));
-        let (from, to) = (places(surface, &tails), places(surface, &heads));
+        let [a, b, c, d] = *edges;
+        let mesh = &surface.mesh;
+        let tails = [mesh.tail(a), mesh.tail(b), mesh.tail(c), mesh.tail(d)];
+        let heads = [mesh.head(a), mesh.head(b), mesh.head(c), mesh.head(d)];
+        let ([x, y, z], [u, v, w]) = (places(surface, tails), places(surface, heads));
         let scale = f32x4::splat(surface.geometry.scale() as f32);
-        let along = std::array::from_fn(|i| (to[i] - from[i]) * scale);
-        let numbers = [&tails, &heads].map(|ends| self.numbers(ends));
-        let least = least(&numbers[0], &numbers[1], along, self.placement);
+        let along = [(u - x) * scale, (v - y) * scale, (w - z) * scale];
+        let (at_tail, at_head) = (self.numbers(tails), self.numbers(heads));
+        let least = least(&at_tail, &at_head, along, self.placement);
         least.costs().to_array()
     }
 
