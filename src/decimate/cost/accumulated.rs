@@ -6,7 +6,8 @@ use wide::f32x4;
 
 use super::form::{Form, Least, Number, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, boundary_weight, singular_weight,
+    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, doubles, each,
+    places, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
@@ -71,17 +72,6 @@ pub struct Accumulated {
     placement: Placement,
 }
 
-/// The coordinates of vertices.
-#[inline(always)]
-fn places<S: EdgeStore>(surface: &Surface<S>, [a, b, c, d]: [VertexId; LANES]) -> [f32x4; 3] {
-    let place = |v| {
-        let [x, y, z] = surface.geometry.position(v).to_array();
-        f32x4::new([x, y, z, 0.0])
-    };
-    let [x, y, z, _] = f32x4::transpose([place(a), place(b), place(c), place(d)]);
-    [x, y, z]
-}
-
 /// Four of a quadric's numbers.
 #[inline(always)]
 fn part(quadric: &Quadric, first: usize) -> f32x4 {
@@ -89,26 +79,11 @@ fn part(quadric: &Quadric, first: usize) -> f32x4 {
 }
 
 impl Accumulated {
-    /// The numbers of a vertex's quadric.
-    #[inline(always)]
-    fn doubles(&self, v: VertexId) -> [f64; 10] {
-        let mut numbers = [0.0; 10];
-        for (double, &single) in numbers.iter_mut().zip(&self.quadrics[v.index()].0) {
-            *double = single.into();
-        }
-        numbers
-    }
-
     /// The numbers of vertices' quadrics.
     #[inline(always)]
-    fn numbers(&self, [a, b, c, d]: [VertexId; LANES]) -> [f32x4; 10] {
-        let [p, q, r, s] = [
-            &self.quadrics[a.index()],
-            &self.quadrics[b.index()],
-            &self.quadrics[c.index()],
-            &self.quadrics[d.index()],
-        ];
-        let parts = |i| f32x4::transpose([part(p, i), part(q, i), part(r, i), part(s, i)]);
+    fn numbers(&self, vertices: [VertexId; LANES]) -> [f32x4; 10] {
+        let quadrics = each(vertices, |v| &self.quadrics[v.index()]);
+        let parts = |i| f32x4::transpose(each(quadrics, |quadric| part(quadric, i)));
         let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (parts(0), parts(4), parts(6));
         [a, b, c, d, e, f, g, h, i, j]
     }
@@ -195,20 +170,18 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
         let [v, w] = surface.mesh.edge_vertices(e);
         let along = surface.geometry.between(v, w).to_array();
-        let (at_v, at_w) = (self.doubles(v), self.doubles(w));
+        let at_v = doubles(&self.quadrics[v.index()].0);
+        let at_w = doubles(&self.quadrics[w.index()].0);
         let least = least(&at_v, &at_w, along, self.placement);
         least.evaluation(surface, [v, w], held, self.placement)
     }
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
-        let [a, b, c, d] = *edges;
-        let mesh = &surface.mesh;
-        let tails = [mesh.tail(a), mesh.tail(b), mesh.tail(c), mesh.tail(d)];
-        let heads = [mesh.head(a), mesh.head(b), mesh.head(c), mesh.head(d)];
-        let ([x, y, z], [u, v, w]) = (places(surface, tails), places(surface, heads));
+        let tails = each(*edges, |e| surface.mesh.tail(e));
+        let heads = each(*edges, |e| surface.mesh.head(e));
         let scale = f32x4::splat(surface.geometry.scale() as f32);
-        let along = [(u - x) * scale, (v - y) * scale, (w - z) * scale];
+        let along = between(&places(surface, tails), &places(surface, heads), scale);
         let (at_tail, at_head) = (self.numbers(tails), self.numbers(heads));
         let least = least(&at_tail, &at_head, along, self.placement);
         least.costs().to_array()

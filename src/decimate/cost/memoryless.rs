@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
-use super::{Cost, Evaluation, LANES, boundary_weight};
+use super::{Cost, Evaluation, LANES, between, boundary_weight, doubles, each, places};
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
@@ -198,7 +198,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation> {
         let ends = surface.mesh.edge_vertices(e);
         let tensors = ends.map(|v| &self.tensors[v.index()]);
-        let [at_v, at_w] = tensors.map(|t| t.numbers.map(f64::from));
+        let (at_v, at_w) = (doubles(&tensors[0].numbers), doubles(&tensors[1].numbers));
         let heavy = tensors.map(|t| t.is_heavy());
         let held = if held == [false; 2] && heavy != [true; 2] {
             heavy
@@ -218,48 +218,44 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
-        let ends = edges.map(|e| surface.mesh.edge_vertices(e));
-        let tensors = [0, 1].map(|end| ends.map(|ends| &self.tensors[ends[end].index()]));
+        let tails = each(*edges, |e| surface.mesh.tail(e));
+        let heads = each(*edges, |e| surface.mesh.head(e));
+        let at_tails = each(tails, |v| &self.tensors[v.index()]);
+        let at_heads = each(heads, |v| &self.tensors[v.index()]);
         let one_by_one = || {
             edges.map(|e| {
                 let evaluation = self.evaluate(surface, e, [false; 2]);
                 evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
             })
         };
-        if tensors.as_flattened().iter().any(|t| t.is_heavy()) {
+        let any_is_heavy =
+            |tensors: [&Tensor; LANES]| tensors.iter().fold(false, |any, t| any | t.is_heavy());
+        if any_is_heavy(at_tails) | any_is_heavy(at_heads) {
             return one_by_one();
         }
-        let [Some(a), Some(b), Some(c), Some(d)] = edges.map(|e| apexes(surface, e)) else {
+        let [Some(a), Some(b), Some(c), Some(d)] = each(*edges, |e| apexes(surface, e)) else {
             return one_by_one();
         };
         let apexes = [a, b, c, d];
         let scale = Lanes::splat(surface.geometry.scale() as f32);
-        let between = |from: [VertexId; LANES], to: [VertexId; LANES]| -> Vector<Lanes> {
-            let [from, to] = [from, to].map(|vertices| {
-                let positions = vertices.map(|v| surface.geometry.position(v));
-                Lanes::transpose(positions.map(|p| Lanes::new([p.x, p.y, p.z, 0.0])))
-            });
-            std::array::from_fn(|i| (to[i] - from[i]) * scale)
-        };
-        let along = between(ends.map(|[v, _]| v), ends.map(|[_, w]| w));
-        let across = between(apexes.map(|[_, b]| b), apexes.map(|[a, _]| a));
+        let along = between(&places(surface, tails), &places(surface, heads), scale);
+        let from = places(surface, each(apexes, |[_, b]| b));
+        let across = between(&from, &places(surface, each(apexes, |[a, _]| a)), scale);
         let dying = Some(cross(&along, &across));
-        let [at_v, at_w] = tensors.map(|tensors| {
+        let numbers = |tensors: [&Tensor; LANES]| {
             let part = |i: usize| {
-                let four = |t: &Tensor| {
-                    let n = &t.numbers;
-                    Lanes::new([n[i], n[i + 1], n[i + 2], n[i + 3]])
-                };
-                Lanes::transpose(tensors.map(four))
+                let four = |t: &Tensor| Lanes::new(*t.numbers[i..].first_chunk().expect("nine"));
+                Lanes::transpose(each(tensors, four))
             };
             let ([a, b, c, d], [e, f, g, h], [.., i]) = (part(0), part(4), part(5));
             [a, b, c, d, e, f, g, h, i]
-        });
+        };
+        let (at_v, at_w) = (numbers(at_tails), numbers(at_heads));
         let weight = if surface.weights.is_empty() {
             Lanes::splat(1.0)
         } else {
-            let larger = |[v, w]: [VertexId; 2]| surface.weight(v).max(surface.weight(w)) as f32;
-            Lanes::new(ends.map(larger))
+            let [tails, heads] = [tails, heads].map(|ends| ends.map(|v| surface.weight(v) as f32));
+            Lanes::new(tails).fast_max(Lanes::new(heads))
         };
         let precision = match self.placement {
             Placement::Optimal => SINGLE,

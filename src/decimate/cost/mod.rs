@@ -9,7 +9,7 @@ mod star;
 
 pub use accumulated::Accumulated;
 pub use form::LANES;
-use form::Least;
+use form::{Lanes, Least, Vector};
 pub use memoryless::Memoryless;
 
 use glam::{DVec3, Vec3};
@@ -123,6 +123,41 @@ fn singular_weight<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId, boundary_weight: f64
         Opposite::Boundary => Some(boundary_weight),
         Opposite::NonManifold(_) => (mesh.canonical(e) == e).then_some(BOUNDARY_WEIGHT),
     }
+}
+
+/// `map`, which the compiler leaves as a call where it should not.
+#[inline(always)]
+fn each<T, U>(four: [T; LANES], f: impl Fn(T) -> U) -> [U; LANES] {
+    let [a, b, c, d] = four;
+    [f(a), f(b), f(c), f(d)]
+}
+
+/// Numbers in double precision.
+#[inline(always)]
+fn doubles<const N: usize>(numbers: &[f32; N]) -> [f64; N] {
+    let mut doubles = [0.0; N];
+    for (double, &number) in doubles.iter_mut().zip(numbers) {
+        *double = number.into();
+    }
+    doubles
+}
+
+/// The coordinates of vertices.
+#[inline(always)]
+fn places<S: EdgeStore>(surface: &Surface<S>, vertices: [VertexId; LANES]) -> Vector<Lanes> {
+    let place = |v| {
+        let [x, y, z] = surface.geometry.position(v).to_array();
+        Lanes::new([x, y, z, 0.0])
+    };
+    let [x, y, z, _] = Lanes::transpose(each(vertices, place));
+    [x, y, z]
+}
+
+/// From some places to others, in the unit box.
+#[inline(always)]
+fn between(from: &Vector<Lanes>, to: &Vector<Lanes>, scale: Lanes) -> Vector<Lanes> {
+    let [[a, b, c], [x, y, z]] = [from, to];
+    [(*x - *a) * scale, (*y - *b) * scale, (*z - *c) * scale]
 }
 
 impl Least<f64> {

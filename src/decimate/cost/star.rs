@@ -1,7 +1,7 @@
 //! The planes, folds and lines around vertices, four fans at a time.
 
-use super::form::{LANES, Lanes, Number, Vector, cross, dot};
-use super::{BOUNDARY_WEIGHT, LINE_WEIGHT, singular_weight};
+use super::form::{LANES, Lanes, Number, Vector, cross, dot, scaled};
+use super::{BOUNDARY_WEIGHT, LINE_WEIGHT, between, each, places, singular_weight};
 use crate::decimate::surface::Surface;
 use crate::decimate::symmetric::Symmetric;
 use crate::mesh::{EdgeId, EdgeStore, Outgoing, VertexId};
@@ -151,39 +151,33 @@ impl Fans {
     /// Walks around the tails of four edges, at which their fans begin.
     #[inline]
     fn walk<S: EdgeStore>(surface: &Surface<S>, starts: &[EdgeId; LANES]) -> Self {
-        let (mesh, geometry) = (&surface.mesh, &surface.geometry);
-        let positions = |vertices: [VertexId; LANES]| -> Vector<Lanes> {
-            let positions = vertices.map(|v| geometry.position(v));
-            let [x, y, z, _] =
-                Lanes::transpose(positions.map(|p| Lanes::new([p.x, p.y, p.z, 0.0])));
-            [x, y, z]
-        };
-        let scale = Lanes::new([geometry.scale() as f32; LANES]);
-        let point = positions(starts.map(|e| mesh.tail(e)));
-        let from_point = |vertices: [VertexId; LANES]| -> Vector<Lanes> {
-            let to = positions(vertices);
-            std::array::from_fn(|i| (to[i] - point[i]) * scale)
-        };
+        let mesh = &surface.mesh;
+        let scale = Lanes::new([surface.geometry.scale() as f32; LANES]);
+        let point = places(surface, each(*starts, |e| mesh.tail(e)));
+        let from_point =
+            |vertices: [VertexId; LANES]| between(&point, &places(surface, vertices), scale);
         let mut fans = Self {
             numbers: [Lanes::ZERO; 9],
             faces: Lanes::ZERO,
             ends: *starts,
         };
-        let mut along = from_point(starts.map(|e| mesh.head(e)));
+        let mut along = from_point(each(*starts, |e| mesh.head(e)));
         // The face before the first of a closed fan; without area where there is none.
-        let across = starts.map(|e| mesh.mate(e).map_or(mesh.head(e), |o| mesh.apex(o)));
+        let across = each(*starts, |e| {
+            mesh.mate(e).map_or(mesh.head(e), |o| mesh.apex(o))
+        });
         let mut last = Side::between(&from_point(across), &along);
         let mut at = *starts;
         loop {
             // A fan that is through stays at its last face's last edge, and finds faces without area.
-            fans.ends = at.map(|e| mesh.prev(e));
+            fans.ends = each(at, |e| mesh.prev(e));
             let mut goes_on = false;
             for i in 0..LANES {
                 let next = mesh.mate(fans.ends[i]).filter(|&o| o != starts[i]);
                 goes_on |= next.is_some();
                 at[i] = next.unwrap_or(at[i]);
             }
-            let next = from_point(fans.ends.map(|e| mesh.tail(e)));
+            let next = from_point(each(fans.ends, |e| mesh.tail(e)));
             let side = Side::between(&along, &next);
             let has_area = side.length.greater(Lanes::ZERO);
             fans.add_outer(&side.normal, (Lanes::HALF / side.length) & has_area);
@@ -220,7 +214,7 @@ impl Fans {
     /// Adds w·n nᵀ.
     #[inline(always)]
     fn add_outer(&mut self, n: &Vector<Lanes>, w: Lanes) {
-        let s = n.map(|x| x * w);
+        let s = scaled(n, w);
         let terms = [
             s[0] * n[0],
             s[0] * n[1],
