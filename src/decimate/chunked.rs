@@ -41,9 +41,10 @@ const SEVERAL: usize = 4;
 /// way round, the whole is oriented first.
 const DISORIENTED: f64 = 0.005;
 
-/// Chunks stop above the target by this factor: what is left is for the loop over the whole mesh,
-/// which needs room to choose.
-const ABOVE_TARGET: f64 = 1.25;
+/// Chunks leave this share of the collapses to the loop over the whole mesh, which needs room to
+/// choose, or that many triangles that the target is exceeded by the second share.
+const LEFT_OVER: f64 = 0.05;
+const MOST_ABOVE_TARGET: f64 = 0.25;
 
 /// A pair of rounds leaves at least this share of the faces, or the seams would be too dense
 /// between what is left inside.
@@ -89,10 +90,17 @@ pub struct Sizes {
     vertices: Range<usize>,
 }
 
+/// The triangles that chunks leave of so many on the way to a target.
+pub fn left_by_chunks(triangles: usize, target: usize) -> f64 {
+    let collapsed = triangles.saturating_sub(target) as f64;
+    let target = target as f64;
+    target + (LEFT_OVER * collapsed).min(MOST_ABOVE_TARGET * target)
+}
+
 impl Sizes {
-    /// The sizes for a mesh of so many faces, double-sided ones counted as two in `triangles`, on its
-    /// way to a target; nothing where chunks are not worth it.
-    pub fn of(chunks: Chunks, faces: usize, triangles: usize, target: usize) -> Option<Self> {
+    /// The sizes for a mesh of so many faces, double-sided ones counted as two in `triangles`, of
+    /// which chunks [leave](left_by_chunks) some; nothing where they are not worth it.
+    pub fn of(chunks: Chunks, faces: usize, triangles: usize, left: f64) -> Option<Self> {
         let (least_faces, vertices) = match chunks {
             Chunks::Off => return None,
             Chunks::Auto => (WORTHWHILE_FACES, CHUNK_VERTICES),
@@ -101,8 +109,7 @@ impl Sizes {
                 (SEVERAL.saturating_mul(triangles), most / 2..most)
             }
         };
-        let least = ABOVE_TARGET * target as f64;
-        let density = (least / triangles as f64).max(LEAST_DENSITY);
+        let density = (left / triangles as f64).max(LEAST_DENSITY);
         let is_worthwhile = faces >= least_faces && density <= WORTHWHILE;
         is_worthwhile.then_some(Self { density, vertices })
     }
@@ -158,14 +165,18 @@ impl Done {
 }
 
 impl Chunked<'_> {
-    fn sizes<V>(&self, flat: &Flat<V>) -> Option<Sizes> {
+    fn sizes<V>(&self, flat: &Flat<V>, left: f64) -> Option<Sizes> {
         let (faces, triangles) = (flat.triangles.len(), flat.triangle_count());
-        Sizes::of(self.options.chunks, faces, triangles, self.stop.triangles)
+        Sizes::of(self.options.chunks, faces, triangles, left)
+    }
+
+    fn left<V>(&self, flat: &Flat<V>) -> f64 {
+        left_by_chunks(flat.triangle_count(), self.stop.triangles)
     }
 
     /// Whether chunks are worth it.
     pub fn is_worthwhile<V>(&self, flat: &Flat<V>) -> bool {
-        self.sizes(flat).is_some()
+        self.sizes(flat, self.left(flat)).is_some()
     }
 
     /// Decimates towards the target, not below it; as far as it is worth it.
@@ -174,7 +185,8 @@ impl Chunked<'_> {
     /// As [`Greedy::advance`].
     pub fn reduce<S: EdgeStore, C: Cost<S>>(&mut self, flat: &mut Flat<C::State>) -> Result<Done> {
         let mut done = Done::default();
-        while let Some(Sizes { density, vertices }) = self.sizes(flat) {
+        let left = self.left(flat);
+        while let Some(Sizes { density, vertices }) = self.sizes(flat, left) {
             let faces = flat.triangle_count();
             let until = Until::Density(density);
             let max_cost = self.round::<S, C>(flat, until, &vertices, &mut done)?;

@@ -37,7 +37,7 @@ pub enum Halt {
     Cancelled,
 }
 
-/// The faces whose edges are evaluated at a time, in parallel.
+/// The faces whose edges are evaluated at a time, in parallel; fewer are left to one thread.
 const BLOCK_FACES: usize = 1 << 16;
 
 /// The faces whose edges are worth a thread.
@@ -127,35 +127,50 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         greedy
     }
 
-    /// Queues every edge that `choose` takes; evaluated in parallel. Whether there is one.
+    /// Queues every edge that `choose` takes; evaluated in parallel where they are many. Whether there
+    /// is one.
     fn queue_all(&mut self, choose: impl Fn(&Self, &Candidate) -> bool + Sync) -> bool {
         let slots = self.surface.mesh.face_slots();
+        let evaluate = |greedy: &Self, first: usize, found: &mut Vec<Candidate>| {
+            let mesh = &greedy.surface.mesh;
+            let slots = first..slots.min(first + PART_FACES);
+            let faces = slots.map(FaceId::new).filter(|&f| mesh.is_live_face(f));
+            let names = faces.flat_map(FaceId::edges);
+            let names = names.filter(|&e| mesh.canonical(e) == e);
+            greedy.evaluate_all(names, |c| {
+                if choose(greedy, &c) {
+                    found.push(c);
+                }
+            });
+        };
         let mut is_any = false;
+        let mut queue = |queue: &mut Q, found: &mut Vec<Candidate>| {
+            is_any |= !found.is_empty();
+            let found = found.drain(..);
+            found.for_each(|candidate| queue.push(candidate, Age::UpToDate));
+        };
+        if slots <= BLOCK_FACES {
+            let mut found = std::mem::take(&mut self.found);
+            for first in (0..slots).step_by(PART_FACES) {
+                evaluate(self, first, &mut found);
+                queue(&mut self.queue, &mut found);
+            }
+            self.found = found;
+            return is_any;
+        }
         // In blocks, so that no second copy of all candidates is held.
         for first in (0..slots).step_by(BLOCK_FACES) {
-            let block = first..slots.min(first + BLOCK_FACES);
-            let parts = block.len().div_ceil(PART_FACES);
+            let last = slots.min(first + BLOCK_FACES);
             let greedy = &*self;
-            let part = |part: usize| {
-                let begin = block.start + part * PART_FACES;
-                let faces = (begin..block.end.min(begin + PART_FACES)).map(FaceId::new);
-                let mesh = &greedy.surface.mesh;
-                let mut names: Vec<EdgeId> = Vec::with_capacity(3 * faces.len());
-                for f in faces.filter(|&f| mesh.is_live_face(f)) {
-                    names.extend(f.edges().into_iter().filter(|&e| mesh.canonical(e) == e));
-                }
-                let mut candidates = Vec::with_capacity(names.len());
-                greedy.evaluate_all(&names, |c| {
-                    if choose(greedy, &c) {
-                        candidates.push(c);
-                    }
-                });
-                candidates
-            };
-            let parts: Vec<Vec<Candidate>> = (0..parts).into_par_iter().map(part).collect();
-            for candidate in parts.into_iter().flatten() {
-                is_any = true;
-                self.queue.push(candidate, Age::UpToDate);
+            let parts = (first..last).into_par_iter().step_by(PART_FACES);
+            let parts = parts.map(|first| {
+                let mut found = Vec::with_capacity(2 * PART_FACES);
+                evaluate(greedy, first, &mut found);
+                found
+            });
+            let parts: Vec<Vec<Candidate>> = parts.collect();
+            for mut part in parts {
+                queue(&mut self.queue, &mut part);
             }
         }
         is_any
@@ -318,8 +333,9 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         let mut pending = std::mem::take(&mut self.pending);
         let mut found = std::mem::take(&mut self.found);
         // Some may have gone since.
-        pending.retain(|e| self.surface.mesh.is_live_face(e.face()));
-        self.evaluate_all(&pending, |candidate| found.push(candidate));
+        let is_live = |e: &EdgeId| self.surface.mesh.is_live_face(e.face());
+        let pending_now = pending.iter().copied().filter(is_live);
+        self.evaluate_all(pending_now, |candidate| found.push(candidate));
         for candidate in found.drain(..) {
             self.queue.push(candidate, Age::UpToDate);
         }
@@ -391,8 +407,12 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     }
 
     /// Gives the candidates of edges, in any order.
-    #[inline]
-    fn evaluate_all(&self, edges: &[EdgeId], mut give: impl FnMut(Candidate)) {
+    #[inline(always)]
+    fn evaluate_all(
+        &self,
+        edges: impl IntoIterator<Item = EdgeId>,
+        mut give: impl FnMut(Candidate),
+    ) {
         let mut give = |edge: EdgeId, cost: f32| {
             let price = self.fill_price(edge).map(|price| price as f32);
             let cost = price.map_or(cost, |price| price.min(cost));
@@ -402,7 +422,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         };
         let mut batch = [EdgeId::new(0); LANES];
         let mut count = 0;
-        for &e in edges {
+        for e in edges {
             match self.surface.held(e) {
                 [false, false] => {
                     batch[count] = e;
@@ -628,7 +648,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 if self.surface.mesh.is_live_face(e.face()) {
                     let mut found = None;
                     let name = self.surface.mesh.canonical(e);
-                    self.evaluate_all(&[name], |c| found = Some(c));
+                    self.evaluate_all([name], |c| found = Some(c));
                     found
                         .into_iter()
                         .for_each(|c| self.queue.push(c, Age::UpToDate));
@@ -668,7 +688,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             }
         }
         let mut found = std::mem::take(&mut self.found);
-        self.evaluate_all(&edges, |candidate| found.push(candidate));
+        self.evaluate_all(edges.iter().copied(), |candidate| found.push(candidate));
         found
             .drain(..)
             .for_each(|candidate| self.queue.push(candidate, Age::UpToDate));

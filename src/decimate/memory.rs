@@ -1,6 +1,6 @@
 //! How much memory there is, how much a tier needs, and so which to take.
 
-use super::chunked::Sizes;
+use super::chunked::{Sizes, left_by_chunks};
 use super::options::{Options, Quality, TierChoice};
 use crate::error::{Error, Result};
 use crate::mesh::Tier;
@@ -90,7 +90,8 @@ pub(super) fn choose_tier(
         TierChoice::Fixed(tier) => Some(tier),
         TierChoice::Auto => None,
     };
-    let chunks = Sizes::of(options.chunks, triangles, triangles, target);
+    let left = left_by_chunks(triangles, target);
+    let chunks = Sizes::of(options.chunks, triangles, triangles, left);
     let needed = |tier| match &chunks {
         Some(sizes) => bytes_in_chunks(sizes, options.quality, tier, vertices, triangles),
         None => needed_bytes(options.quality, tier, vertices, triangles),
@@ -164,7 +165,7 @@ mod tests {
     /// the full tier, and in the small one, whose pilot is smaller, less than that.
     #[test]
     fn chunks_need_less() {
-        let sizes = Sizes::of(Chunks::Auto, 1_000_000, 1_000_000, 100_000).unwrap();
+        let sizes = Sizes::of(Chunks::Auto, 1_000_000, 1_000_000, 125_000.0).unwrap();
         for quality in [Quality::Fast, Quality::Standard] {
             let [full, small] = [Tier::Full, Tier::Small]
                 .map(|tier| bytes_in_chunks(&sizes, quality, tier, 500_000, 1_000_000));

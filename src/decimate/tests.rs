@@ -1349,7 +1349,7 @@ mod chunked {
         for (name, shape, within) in [
             ("torus", shapes::torus(240, 80), 1.03),
             ("shuffled", shuffled(&even), 1.04),
-            ("even", even, 1.04),
+            ("even", even, 1.05),
             ("ball on a block", ball_on_a_block(6), 1.05),
         ] {
             let original = mesh(shape);

@@ -4,7 +4,7 @@
 use glam::DVec3;
 use wide::f32x4;
 
-use super::form::{Form, Least, Number, dot, plus};
+use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, doubles, each,
     places, singular_weight,
@@ -13,7 +13,7 @@ use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
-use crate::mesh::{Collapse, EdgeId, EdgeStore, VertexId};
+use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, VertexId};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
 /// y from the vertex, where single precision has all its digits. 40 bytes.
@@ -28,10 +28,17 @@ impl Quadric {
         Self([xx, xy, xz, yy, yz, zz, b.x, b.y, b.z, c].map(|x| x as f32))
     }
 
+    #[inline]
+    fn add(&mut self, other: &Self) {
+        for (number, &term) in self.0.iter_mut().zip(&other.0) {
+            *number += term;
+        }
+    }
+
     /// A, b and c as seen from a point at `d` from the vertex.
     #[inline(always)]
     fn seen_from(&self, d: DVec3) -> (Symmetric, DVec3, f64) {
-        let [xx, xy, xz, yy, yz, zz, x, y, z, c] = self.0.map(f64::from);
+        let [xx, xy, xz, yy, yz, zz, x, y, z, c] = doubles(&self.0);
         let (a, b) = (Symmetric([xx, xy, xz, yy, yz, zz]), DVec3::new(x, y, z));
         let along = a.times(d);
         (a, b - along, c - 2.0 * b.dot(d) + d.dot(along))
@@ -72,6 +79,37 @@ pub struct Accumulated {
     placement: Placement,
 }
 
+/// Adds the planes of the first faces of four to their corners' quadrics.
+#[inline]
+fn add_planes<S: EdgeStore>(
+    surface: &Surface<S>,
+    faces: [FaceId; LANES],
+    count: usize,
+    quadrics: &mut [Quadric],
+) {
+    let corners = each(faces, |f| surface.mesh.face_vertices(f));
+    let scale = f32x4::splat(surface.geometry.scale() as f32);
+    let at = |k: usize| places(surface, each(corners, |corners| corners[k]));
+    let (a, b, c) = (at(0), at(1), at(2));
+    let normal = cross(&between(&a, &b, scale), &between(&a, &c, scale));
+    let length = dot(&normal, &normal).sqrt();
+    let [x, y, z] = normal;
+    let weight = (f32x4::HALF / length) & length.simd_gt(f32x4::ZERO);
+    let [wx, wy, wz] = [x * weight, y * weight, z * weight];
+    let first = f32x4::transpose([wx * x, wx * y, wx * z, wy * y]);
+    let second = f32x4::transpose([wy * z, wz * z, f32x4::ZERO, f32x4::ZERO]);
+    let planes = first.into_iter().zip(second);
+    for (corners, (first, second)) in corners.into_iter().zip(planes).take(count) {
+        for v in corners {
+            let quadric = &mut quadrics[v.index()].0;
+            for (i, terms) in [(0, first), (4, second)] {
+                let numbers: &mut [f32; 4] = quadric[i..].first_chunk_mut().expect("ten numbers");
+                *numbers = (f32x4::new(*numbers) + terms).to_array();
+            }
+        }
+    }
+}
+
 /// Four of a quadric's numbers.
 #[inline(always)]
 fn part(quadric: &Quadric, first: usize) -> f32x4 {
@@ -97,45 +135,44 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     type State = Quadric;
 
     fn new(surface: &Surface<S>, options: &Options) -> Self {
-        let (mesh, geometry) = (&surface.mesh, &surface.geometry);
-        let mut sums = vec![Symmetric::default(); mesh.vertex_slots()];
-        let boundary = boundary_weight(options.boundary);
-        for f in mesh.faces() {
-            let corners = mesh.face_vertices(f);
-            let [a, b, c] = corners.map(|v| geometry.position(v));
-            let normal = geometry
-                .vector(a, corners[1])
-                .cross(geometry.vector(a, corners[2]));
-            let length = normal.length();
-            if length > 0.0 {
-                let mut plane = Symmetric::default();
-                plane.add_outer(normal, 0.5 / length);
-                for v in corners {
-                    sums[v.index()] = sums[v.index()].plus(plane);
-                }
+        let mesh = &surface.mesh;
+        let mut quadrics = vec![Quadric::default(); mesh.vertex_slots()];
+        let mut faces = mesh.faces();
+        while let Some(first) = faces.next() {
+            let mut four = [first; LANES];
+            let mut count = 1;
+            for (place, f) in four[1..].iter_mut().zip(&mut faces) {
+                *place = f;
+                count += 1;
             }
-            for (e, along) in f.edges().into_iter().zip([b - a, c - b, a - c]) {
-                if mesh.mate(e).is_some() && surface.creases.is_empty() {
-                    continue;
-                }
-                // A crease is met from both of its faces.
-                let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
-                let of_singular =
-                    || singular_weight(mesh, e, boundary).filter(|_| !surface.is_rim(e));
-                if let Some(weight) = of_crease.or_else(of_singular) {
-                    let along = along.as_dvec3() * geometry.scale();
-                    for v in mesh.edge_vertices(e) {
-                        sums[v.index()].add_line(along, LINE_WEIGHT * weight);
-                    }
+            add_planes(surface, four, count, &mut quadrics);
+        }
+        let boundary = boundary_weight(options.boundary);
+        for e in mesh.faces().flat_map(FaceId::edges) {
+            if mesh.mate(e).is_some() && surface.creases.is_empty() {
+                continue;
+            }
+            // A crease is met from both of its faces.
+            let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
+            let of_singular = || singular_weight(mesh, e, boundary).filter(|_| !surface.is_rim(e));
+            if let Some(weight) = of_crease.or_else(of_singular) {
+                let [v, w] = mesh.edge_vertices(e);
+                let mut line = Symmetric::default();
+                line.add_line(surface.geometry.between(v, w), LINE_WEIGHT * weight);
+                let line = Quadric::new(line, DVec3::ZERO, 0.0);
+                for end in [v, w] {
+                    quadrics[end.index()].add(&line);
                 }
             }
         }
-        let quadric = |(v, sum): (usize, Symmetric)| {
-            let weight = surface.weight(VertexId::new(v));
-            Quadric::new(Symmetric(sum.0.map(|x| x * weight)), DVec3::ZERO, 0.0)
-        };
+        if !surface.weights.is_empty() {
+            for (v, quadric) in quadrics.iter_mut().enumerate() {
+                let weight = surface.weight(VertexId::new(v)) as f32;
+                quadric.0.iter_mut().for_each(|number| *number *= weight);
+            }
+        }
         Self {
-            quadrics: sums.into_iter().enumerate().map(quadric).collect(),
+            quadrics,
             placement: options.placement,
         }
     }
@@ -163,7 +200,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     }
 
     fn join(state: &mut Quadric, part: &Quadric) {
-        state.0 = std::array::from_fn(|i| state.0[i] + part.0[i]);
+        state.add(part);
     }
 
     #[inline]
@@ -194,16 +231,10 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         changed: &mut Vec<VertexId>,
     ) {
         let Collapse { kept, removed, .. } = merged.collapse;
-        let sum = [removed, kept]
-            .into_iter()
-            .zip(merged.from)
-            .map(|(v, from)| {
-                let moved = surface.geometry.vector(from, kept);
-                self.quadrics[v.index()].seen_from(moved)
-            })
-            .reduce(|(a, b, c), (a2, b2, c2)| (a.plus(a2), b + b2, c + c2));
-        let (a, b, c) = sum.expect("two ends");
-        self.quadrics[kept.index()] = Quadric::new(a, b, c.max(0.0));
+        let moved = merged.from.map(|from| surface.geometry.vector(from, kept));
+        let (a, b, c) = self.quadrics[removed.index()].seen_from(moved[0]);
+        let (a2, b2, c2) = self.quadrics[kept.index()].seen_from(moved[1]);
+        self.quadrics[kept.index()] = Quadric::new(a.plus(a2), b + b2, (c + c2).max(0.0));
         changed.clear();
     }
 
