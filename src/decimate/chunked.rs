@@ -435,7 +435,26 @@ struct Singular {
 
 /// An edge between two vertices on the seam by their numbers in the whole, the smaller first, and
 /// whether it runs that way.
-type RimEdge = (u32, u32, bool);
+///
+/// In one word, so that they are sorted quickly: 31 bits each for the vertices, one for the way.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct RimEdge(u64);
+
+impl RimEdge {
+    fn between(tail: u32, head: u32) -> Self {
+        let (small, large) = (tail.min(head), tail.max(head));
+        Self(u64::from(small) << 32 | u64::from(large) << 1 | u64::from(tail < head))
+    }
+
+    fn ends(self) -> [u32; 2] {
+        [(self.0 >> 32) as u32, self.0 as u32 >> 1]
+    }
+
+    /// Whether both are the same edge, whichever way.
+    fn is_beside(&self, other: &Self) -> bool {
+        self.0 >> 1 == other.0 >> 1
+    }
+}
 
 impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
     /// Builds the mesh of a chunk and queues its edges.
@@ -638,7 +657,7 @@ fn singular<S: EdgeStore>(surface: &Surface<S>, vertices: &[u32]) -> Singular {
     {
         if surface.is_rim(e) {
             let [a, b] = mesh.edge_vertices(e).map(|v| vertices[v.index()]);
-            singular.rim.push((a.min(b), a.max(b), a < b));
+            singular.rim.push(RimEdge::between(a, b));
         } else if !mesh.is_boundary(e) && mesh.canonical(e) == e {
             singular.non_manifold_edges += 1;
             singular.conflicts += usize::from(mesh.edge_star(e).len() == 2);
@@ -664,8 +683,8 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
         non_manifold_edges += outcome.singular.non_manifold_edges;
     }
     rim.par_sort_unstable();
-    let edges = || rim.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
-    let is_singular = |edge: &&[RimEdge]| !matches!(edge, [a, b] if a.2 != b.2);
+    let edges = || rim.chunk_by(RimEdge::is_beside);
+    let is_singular = |edge: &&[RimEdge]| !matches!(edge, [a, b] if a != b);
     non_manifold_edges += edges()
         .filter(is_singular)
         .filter(|edge| edge.len() > 1)
@@ -711,7 +730,7 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     let lines: Vec<(u32, C::State)> = edges()
         .filter(is_singular)
         .flat_map(|edge| {
-            let [a, b] = [edge[0].0, edge[0].1];
+            let [a, b] = edge[0].ends();
             let [p, q] = [a, b].map(|v| flat.positions[v as usize].as_dvec3() * scale);
             [a, b].map(|v| {
                 (

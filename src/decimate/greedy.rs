@@ -422,7 +422,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         };
         let mut batch = [EdgeId::new(0); LANES];
         let mut count = 0;
-        for e in edges {
+        edges.into_iter().for_each(|e| {
             match self.surface.held(e) {
                 [false, false] => {
                     batch[count] = e;
@@ -442,7 +442,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 (0..LANES).for_each(|i| give(batch[i], costs[i]));
                 count = 0;
             }
-        }
+        });
         if count > 0 {
             let first = batch[0];
             batch[count..].fill(first);

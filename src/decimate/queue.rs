@@ -241,9 +241,11 @@ impl Queue for Buckets {
             list.reserve(list.len().max(LIST_ENTRIES));
             self.room += list.capacity() - list.len();
         }
+        if list.is_empty() {
+            self.filled[bucket / 64] |= 1 << (bucket % 64);
+            self.lowest = self.lowest.min(bucket);
+        }
         list.push(edge.index() as u32);
-        self.filled[bucket / 64] |= 1 << (bucket % 64);
-        self.lowest = self.lowest.min(bucket);
         self.entries += 1;
         if self.entries > self.places.len() + self.places.len() / 2 {
             self.sweep();
