@@ -39,7 +39,12 @@ const ARROWS: [(&str, &[&str]); 9] = [
 const COMMAND: [&str; 3] = ["main.rs", "cli.rs", "text.rs"];
 
 /// Tests and their shapes: a file here is allowed everything, and its `mod` must be `cfg(test)`.
-const TEST_FILES: [&str; 3] = ["shapes.rs", "mesh/tests.rs", "decimate/tests.rs"];
+const TEST_FILES: [&str; 4] = [
+    "shapes.rs",
+    "mesh/tests.rs",
+    "mesh/modify_tests.rs",
+    "decimate/tests.rs",
+];
 
 /// A token and its line, brackets of groups among them.
 struct Token {
