@@ -39,6 +39,8 @@ impl<S: EdgeStore> Mesh<S> {
         let next = self.next_on_boundary(e).expect("a boundary edge behind");
         let (a, v, b) = (self.tail(e), self.head(e), self.head(next));
         self.add_face([v, a, b], face);
+        // The walk around v, closed now, begins where it did: sums along it stay what they were.
+        self.set_outgoing(v, Outgoing::Fan(next));
         [a, v, b]
     }
 }
