@@ -10,7 +10,7 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("error", &[]),
     ("indexed_mesh", &["error"]),
     ("mesh", &[]),
@@ -32,6 +32,10 @@ const ARROWS: [(&str, &[&str]); 9] = [
     (
         "metrics",
         &["error", "indexed_mesh", "clean", "mesh", "nearest"],
+    ),
+    (
+        "repair",
+        &["error", "indexed_mesh", "clean", "mesh", "metrics"],
     ),
 ];
 
