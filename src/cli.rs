@@ -19,7 +19,8 @@ use decimate::mesh::Tier;
     subcommand_negates_reqs = true,
     override_usage = "decimate INPUT -o OUTPUT [--ratio R] [--triangles N] [--max-error E] [OPTIONS]\n       \
                       decimate info MESH [--json]\n       \
-                      decimate compare REFERENCE MESH... [--json]",
+                      decimate compare REFERENCE MESH... [--json]\n       \
+                      decimate repair INPUT -o OUTPUT --cut [OPTIONS]",
     after_help = "Exit status: 0 done (also when stopped short, which is said), 1 a file or mesh could not be \
                   processed, 2 wrong usage, 3 stopped short under --strict.\n\n\
                   Examples:\n  \
@@ -43,6 +44,47 @@ pub enum Command {
     Info(InfoArgs),
     /// Measures how far meshes are from a reference, and what is wrong with them.
     Compare(CompareArgs),
+    /// Makes a mesh manifold.
+    Repair(RepairArgs),
+}
+
+/// The arguments of `decimate repair`.
+#[derive(Debug, Args)]
+pub struct RepairArgs {
+    /// The mesh to repair: PLY, OBJ, STL or OFF; - for standard input.
+    pub input: PathBuf,
+    /// The file to write, by its extension; - for standard output. Not STL, in which faces share no
+    /// vertices: a cut would be lost.
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// Cut along edges of three faces or more and at vertices whose faces are not one fan, with few
+    /// copies of vertices; positions and faces stay as they are. Decimating the output needs
+    /// --no-weld, or the copies become one again.
+    #[arg(long)]
+    pub cut: bool,
+    /// Keep vertices at equal positions apart (they are welded otherwise, unless that alone would
+    /// make the mesh non-manifold).
+    #[arg(long)]
+    pub no_weld: bool,
+    /// The input's format, where neither content nor extension says it.
+    #[arg(long, value_name = "FORMAT")]
+    pub input_format: Option<Format>,
+    /// The output's format, where the extension does not say it.
+    #[arg(long, value_name = "FORMAT")]
+    pub output_format: Option<Format>,
+    /// Write PLY as text.
+    #[arg(long)]
+    pub ascii: bool,
+    /// Significant digits of the numbers in text files; as many as give the same number back where
+    /// not given.
+    #[arg(long, value_name = "DIGITS", value_parser = clap::value_parser!(u8).range(1..=17))]
+    pub precision: Option<u8>,
+    /// Write what was done as JSON; - for standard output.
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Say nothing but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// The arguments of `decimate compare`.
@@ -78,7 +120,8 @@ pub struct InfoArgs {
     /// The mesh's format, where neither content nor extension says it.
     #[arg(long, value_name = "FORMAT")]
     pub input_format: Option<Format>,
-    /// Keep vertices at equal positions apart.
+    /// Keep vertices at equal positions apart (they are welded otherwise, unless that alone would
+    /// make the mesh non-manifold).
     #[arg(long)]
     pub no_weld: bool,
 }

@@ -19,8 +19,8 @@
 //!
 //! Data flows one way: [`io`] makes an [`indexed_mesh::IndexedMesh`], [`clean`] makes a simplicial
 //! complex of it, [`decimate`] turns it into another over a [`mesh::Mesh`] in one of three memory
-//! tiers, [`io`] writes it, [`metrics`] says what is in it. [`spatial`] puts positions in an order in
-//! which neighbours stand together.
+//! tiers, [`io`] writes it, [`metrics`] says what is in it, [`repair`] makes it manifold. [`spatial`]
+//! puts positions in an order in which neighbours stand together.
 //!
 //! # Limits
 //! At most 2³¹−1 directed edges (715 million triangles) and 2³¹−1 vertices. Coordinates are single
@@ -34,6 +34,7 @@ pub mod io;
 pub mod mesh;
 pub mod metrics;
 pub mod nearest;
+pub mod repair;
 #[cfg(test)]
 mod shapes;
 pub mod spatial;

@@ -14,12 +14,13 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use decimate::decimate::{Progress, decimate_with_progress, peak_rss_bytes};
 use decimate::error::Error;
-use decimate::io::{self, ReadOptions, WriteOptions};
-use decimate::metrics::{CompareOptions, Reference, info};
+use decimate::io::{self, Format, ReadOptions, WriteOptions};
+use decimate::metrics::{CompareOptions, Reference, info, info_of_file};
+use decimate::repair;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use cli::{Cli, Command, CompareArgs, InfoArgs, Run};
+use cli::{Cli, Command, CompareArgs, InfoArgs, RepairArgs, Run};
 use text::Compared;
 
 /// Exit status of a run that stopped short under `--strict`.
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
     let done = match &cli.command {
         Some(Command::Info(args)) => show_info(args),
         Some(Command::Compare(args)) => show_comparison(args),
+        Some(Command::Repair(args)) => run_repair(args),
         None => run(&cli.run),
     };
     done.unwrap_or_else(|error| {
@@ -47,24 +49,8 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     let (Some(input), Some(output)) = (&args.input, &args.output) else {
         unreachable!("the command line requires both");
     };
-    let report_to_stdout = args.report.as_deref() == Some(Path::new("-"));
-    if report_to_stdout && output == Path::new("-") {
-        return Err(Error::InvalidOptions(
-            "-o - and --report - would both write to standard output".into(),
-        ));
-    }
     use_threads(args.threads)?;
-    if let Some(report) = &args.report {
-        for other in [input, output] {
-            if is_same_file(report, other) {
-                return Err(Error::InvalidOptions(format!(
-                    "--report {} would overwrite the mesh of that name",
-                    report.display()
-                )));
-            }
-        }
-        io::check_place(report)?;
-    }
+    check_report(args.report.as_deref(), input, output)?;
     let options = args.options();
     options.check()?;
     let write_options = WriteOptions {
@@ -116,13 +102,55 @@ fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
         ..ReadOptions::default()
     };
     let mesh = io::read(&args.mesh, &read_options)?;
-    let info = info(mesh, !args.no_weld).map_err(|error| name_mesh(error, &args.mesh))?;
+    let info = if args.no_weld {
+        info(mesh, false)
+    } else {
+        info_of_file(mesh)
+    }
+    .map_err(|error| name_mesh(error, &args.mesh))?;
     if args.json {
         write_json(Path::new("-"), &info)?;
     } else {
         io::write_file(Path::new("-"), |out| {
             out.write_all(text::info(&info).as_bytes())
         })?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
+    if !args.cut {
+        return Err(Error::InvalidOptions(
+            "nothing to repair is named; --cut is expected".into(),
+        ));
+    }
+    let (input, output) = (&args.input, &args.output);
+    check_report(args.report.as_deref(), input, output)?;
+    let write_options = WriteOptions {
+        format: args.output_format,
+        ascii: args.ascii,
+        precision: args.precision.map(usize::from),
+    };
+    if io::output_format(output, &write_options)? == Format::Stl {
+        return Err(Error::InvalidOptions(
+            "in STL faces share no vertices, a cut would be lost; ply, obj or off is expected"
+                .into(),
+        ));
+    }
+    io::check_place(output)?;
+    let read_options = ReadOptions {
+        format: args.input_format,
+        ..ReadOptions::default()
+    };
+    let mesh = io::read(input, &read_options)?;
+    let (mesh, report) =
+        repair::cut(mesh, !args.no_weld).map_err(|error| name_mesh(error, input))?;
+    io::write(output, &mesh, &write_options)?;
+    if let Some(path) = &args.report {
+        write_json(path, &report)?;
+    }
+    if !args.quiet {
+        eprint!("{}", text::repair(input, output, &report));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -155,6 +183,25 @@ fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
         })?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a report that would be written where a mesh is, or could not be written at all.
+fn check_report(report: Option<&Path>, input: &Path, output: &Path) -> Result<(), Error> {
+    let Some(report) = report else { return Ok(()) };
+    if report == Path::new("-") && output == Path::new("-") {
+        return Err(Error::InvalidOptions(
+            "-o - and --report - would both write to standard output".into(),
+        ));
+    }
+    for other in [input, output] {
+        if is_same_file(report, other) {
+            return Err(Error::InvalidOptions(format!(
+                "--report {} would overwrite the mesh of that name",
+                report.display()
+            )));
+        }
+    }
+    io::check_place(report)
 }
 
 /// Sets the number of threads; more than eight a processor would only cost their stacks.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use decimate::decimate::{Report, StopReason};
 use decimate::metrics::{Comparison, Info, TwoSided};
+use decimate::repair::CutReport;
 use serde::Serialize;
 
 /// A mesh held against the reference, with the names of both files.
@@ -83,6 +84,28 @@ pub fn summary(input: &Path, output: &Path, report: &Report) -> String {
         );
     }
     text
+}
+
+/// What a cut did, in a few lines for a person.
+pub fn repair(input: &Path, output: &Path, report: &CutReport) -> String {
+    format!(
+        "{} -> {}: {} vertices copied ({} -> {})\n\
+         non-manifold edges {} -> {}, non-manifold vertices {} -> {}, components {} -> {}, \
+         boundary edges {} -> {}\n",
+        input.display(),
+        output.display(),
+        report.vertices_copied,
+        report.cleaning.kept_vertices,
+        report.vertices_out,
+        report.non_manifold_edges_in,
+        report.non_manifold_edges_out,
+        report.non_manifold_vertices_in,
+        report.non_manifold_vertices_out,
+        report.components_in,
+        report.components_out,
+        report.boundary_edges_in,
+        report.boundary_edges_out,
+    )
 }
 
 /// The counts of a mesh as a table.

@@ -1009,6 +1009,85 @@ fn info_counts_what_is_there() {
     }
 }
 
+/// Whatever is not manifold in the hand-written meshes is none after the cut, to `info` too, in each
+/// format that can hold it; the faces keep their order and their corners' places.
+#[test]
+fn repair_cuts_what_is_not_manifold() {
+    let folder = Folder::with(&["three_fins.obj", "bow_tie.obj", "cube_quads.obj"]);
+    for (mesh, copies, edges, vertices) in [
+        // Two run along the edge opposite ways and stay together.
+        ("three_fins.obj", 2, 1, 2),
+        ("bow_tie.obj", 1, 0, 1),
+        ("cube_quads.obj", 0, 0, 0),
+    ] {
+        for output in ["out.ply", "out.obj", "out.off"] {
+            let report = folder.report(&format!("repair {mesh} -o {output} --cut"));
+            for (key, value) in [
+                ("vertices_copied", copies),
+                ("non_manifold_edges_in", edges),
+                ("non_manifold_vertices_in", vertices),
+                ("non_manifold_edges_out", 0),
+                ("non_manifold_vertices_out", 0),
+            ] {
+                assert_eq!(report[key], value, "{mesh}, {output}: {key}");
+            }
+            let info = folder.info(output);
+            for key in ["non_manifold_edges", "non_manifold_vertices"] {
+                assert_eq!(info[key], 0, "{mesh}, {output}: {key}");
+            }
+            let (before, after) = (folder.mesh(mesh), folder.mesh(output));
+            let count = before.positions().len();
+            assert_eq!(after.positions()[..count], *before.positions());
+            assert_eq!(after.positions().len(), count + copies);
+            let corners = |mesh: &IndexedMesh| -> Vec<[Vec3; 3]> {
+                let at = |v: u32| mesh.positions()[v as usize];
+                mesh.triangles().iter().map(|t| t.map(at)).collect()
+            };
+            assert_eq!(corners(&after), corners(&before));
+        }
+    }
+}
+
+/// The summary goes to people; what cannot be done is said before the input is read.
+#[test]
+fn repair_says_what_it_did_or_why_not() {
+    let folder = Folder::with(&["bow_tie.obj"]);
+    let ran = folder.run("repair bow_tie.obj -o out.ply --cut");
+    assert_eq!((ran.status, ran.stdout.len()), (0, 0));
+    assert!(
+        ran.stderr.contains("1 vertices copied (7 -> 8)"),
+        "{}",
+        ran.stderr
+    );
+    assert!(
+        ran.stderr.contains("non-manifold vertices 1 -> 0"),
+        "{}",
+        ran.stderr
+    );
+    let ran = folder.run("repair bow_tie.obj -o out.ply --cut --quiet");
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let before = folder.names();
+    for (arguments, needle) in [
+        ("missing.ply -o other.ply", "--cut"),
+        ("missing.ply -o other.stl --cut", "STL"),
+        ("missing.ply -o other.xyz --cut", "extension"),
+        (
+            "missing.ply -o - --output-format off --cut --report -",
+            "standard output",
+        ),
+        (
+            "bow_tie.obj -o other.ply --cut --report bow_tie.obj",
+            "overwrite",
+        ),
+    ] {
+        folder.run(&format!("repair {arguments}")).failed(2, needle);
+    }
+    folder
+        .run("repair missing.ply -o other.ply --cut")
+        .failed(1, "missing.ply");
+    assert_eq!(folder.names(), before);
+}
+
 /// The table for people has the numbers of the JSON.
 #[test]
 fn info_is_a_table_too() {

@@ -1,16 +1,20 @@
 //! What decimation promises, on meshes that others made: `MESHES=folder cargo test --test meshes`,
 //! where the folder has `meshes/` and `malformed/`. Without `MESHES` these tests say so and pass.
 
-use std::collections::HashMap;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use decimate::clean::clean;
 use decimate::decimate::{Options, Report, StopReason, Targets, TierChoice, decimate};
 use decimate::indexed_mesh::IndexedMesh;
-use decimate::io::{self, ReadOptions};
-use decimate::mesh::Tier;
-use decimate::metrics::{Info, info};
+use decimate::io::{self, ReadOptions, WriteOptions};
+use decimate::mesh::{EdgeId, EdgeStore, Full, Medium, Mesh, Small, Tier, VertexSplit};
+use decimate::metrics::{Info, info, info_of_file};
+use decimate::repair::cut;
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// The fractions to keep.
@@ -249,6 +253,140 @@ fn stays_in_the_box(input: &IndexedMesh, output: &IndexedMesh, say: &mut dyn FnM
     }
 }
 
+/// A collapse that can be undone: the split, and where both vertices were.
+struct Undo {
+    split: VertexSplit,
+    positions: [Vec3; 2],
+}
+
+/// Collapses the shortest edges onto their middles, down to so many triangles.
+fn collapse_shortest<S: EdgeStore>(
+    mesh: &mut Mesh<S>,
+    positions: &mut [Vec3],
+    triangles: usize,
+) -> Vec<Undo> {
+    let length = |mesh: &Mesh<S>, positions: &[Vec3], e: EdgeId| {
+        let [a, b] = mesh.edge_vertices(e).map(|v| positions[v.index()]);
+        a.distance_squared(b).to_bits()
+    };
+    let mut queue: BinaryHeap<Reverse<(u32, EdgeId)>> = mesh
+        .edges()
+        .map(|e| Reverse((length(mesh, positions, e), e)))
+        .collect();
+    let mut undo = Vec::new();
+    while mesh.face_count() > triangles {
+        let Some(Reverse((cost, e))) = queue.pop() else {
+            break;
+        };
+        let is_current = mesh.is_live_face(e.face()) && length(mesh, positions, e) == cost;
+        if !is_current || !mesh.link_condition(e) {
+            continue;
+        }
+        let split = mesh.split_undoing(e);
+        let ends = [split.kept, split.removed].map(|v| v.index());
+        let middle = positions[ends[0]].midpoint(positions[ends[1]]);
+        undo.push(Undo {
+            positions: ends.map(|v| positions[v]),
+            split,
+        });
+        let kept = mesh.collapse(e).kept;
+        positions[kept.index()] = middle;
+        for e in mesh.vertex_edges(kept) {
+            queue.push(Reverse((length(mesh, positions, e), e)));
+        }
+    }
+    undo
+}
+
+fn bunny_and_back<S: EdgeStore>(input: &IndexedMesh) -> usize {
+    let mut mesh = Mesh::<S>::from_triangles(input.positions().len(), input.triangles());
+    let mut positions = input.positions().to_vec();
+    let undo = collapse_shortest(&mut mesh, &mut positions, 500);
+    assert!(mesh.face_count() <= 500, "{} faces", mesh.face_count());
+    mesh.check().unwrap();
+    assert_ne!(positions, input.positions());
+    let collapses = undo.len();
+    for Undo {
+        split,
+        positions: [kept, removed],
+    } in undo.into_iter().rev()
+    {
+        mesh.split_vertex(&split);
+        positions[split.kept.index()] = kept;
+        positions[split.removed.index()] = removed;
+    }
+    mesh.check().unwrap();
+    assert_eq!(mesh.triangles(), input.triangles());
+    assert_eq!(positions, input.positions());
+    collapses
+}
+
+/// The bunny down to 500 triangles and back by vertex splits, in each tier: the same triangles and
+/// positions in the same order.
+#[test]
+fn the_bunny_comes_back_from_500_triangles() {
+    let Some(files) = files("meshes") else {
+        return;
+    };
+    let is_bunny = |file: &&PathBuf| file.ends_with("stanford-bunny.obj");
+    let Some(file) = files.iter().find(is_bunny) else {
+        eprintln!("skipped: no stanford-bunny.obj among the meshes");
+        return;
+    };
+    let input = io::read(file, &ReadOptions::default()).unwrap();
+    let (input, _) = clean(input, true).unwrap();
+    let collapses = [
+        bunny_and_back::<Full>(&input),
+        bunny_and_back::<Medium>(&input),
+        bunny_and_back::<Small>(&input),
+    ];
+    println!(
+        "{} triangles, {collapses:?} collapses undone",
+        input.triangles().len()
+    );
+}
+
+/// Nothing is non-manifold after a cut, also when read back; every face is where it was, and what was
+/// manifold is not cut. The table is printed.
+#[test]
+fn a_cut_makes_every_mesh_manifold() {
+    let Some(files) = files("meshes") else {
+        return;
+    };
+    let is_ours = |file: &&PathBuf| file.extension().is_some_and(|e| e != "glb");
+    for file in files.iter().filter(is_ours) {
+        let name = file.file_name().unwrap().display();
+        let input = io::read(file, &ReadOptions::default()).unwrap();
+        let (output, report) = cut(input.clone(), true).unwrap();
+        println!(
+            "{name}: edges {} -> {}, vertices {} -> {}, {} copied of {}, components {} -> {}",
+            report.non_manifold_edges_in,
+            report.non_manifold_edges_out,
+            report.non_manifold_vertices_in,
+            report.non_manifold_vertices_out,
+            report.vertices_copied,
+            report.cleaning.kept_vertices,
+            report.components_in,
+            report.components_out,
+        );
+        assert_eq!(report.non_manifold_edges_out, 0, "{name}");
+        assert_eq!(report.non_manifold_vertices_out, 0, "{name}");
+        let was_manifold = report.non_manifold_vertices_in == 0;
+        assert_eq!(report.vertices_copied == 0, was_manifold, "{name}");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.ply");
+        io::write(&path, &output, &WriteOptions::default()).unwrap();
+        let written = io::read(&path, &ReadOptions::default()).unwrap();
+        assert!(info_of_file(written).unwrap().is_manifold(), "{name}");
+        let (before, _) = clean(input, report.cleaning.welded_vertices > 0).unwrap();
+        let corners = |mesh: &IndexedMesh| -> Vec<[[u32; 3]; 3]> {
+            let at = |v: u32| mesh.positions()[v as usize].to_array().map(f32::to_bits);
+            mesh.triangles().iter().map(|t| t.map(at)).collect()
+        };
+        assert!(corners(&output) == corners(&before), "{name}");
+    }
+}
+
 /// Read or refused by the command itself: no panic, no hang, the file named, nothing left behind.
 #[test]
 fn malformed_files_are_decimated_or_refused() {
@@ -259,12 +397,17 @@ fn malformed_files_are_decimated_or_refused() {
     let limit = Duration::from_secs(5);
     for file in files {
         let name = file.file_name().unwrap().to_str().unwrap();
-        for command in ["decimate", "info"] {
+        for command in ["decimate", "info", "repair"] {
             let folder = tempfile::tempdir().unwrap();
             let output = folder.path().join("out.ply");
             let mut run = Command::new(env!("CARGO_BIN_EXE_decimate"));
             match command {
                 "info" => run.arg("info").arg(&file),
+                "repair" => run
+                    .arg("repair")
+                    .arg(&file)
+                    .args(["--cut", "-o"])
+                    .arg(&output),
                 _ => run.arg(&file).args(["--ratio", "0.5", "-o"]).arg(&output),
             };
             let start = Instant::now();
@@ -276,7 +419,7 @@ fn malformed_files_are_decimated_or_refused() {
             assert!(elapsed < limit, "{what}: took {elapsed:?}");
             let left = folder.path().read_dir().unwrap().count();
             match ran.status.code() {
-                Some(0) if command == "decimate" => {
+                Some(0) if command != "info" => {
                     let small = io::read(&output, &ReadOptions::default())
                         .unwrap_or_else(|e| panic!("{what}: {e}"));
                     assert!(small.positions().iter().all(|p| p.is_finite()), "{what}");

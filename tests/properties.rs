@@ -16,7 +16,8 @@ use decimate::error::Error;
 use decimate::indexed_mesh::{IndexedMesh, Parts};
 use decimate::io::{self, ReadOptions, WriteOptions};
 use decimate::mesh::Tier;
-use decimate::metrics::{Info, info};
+use decimate::metrics::{Info, info, info_of_file};
+use decimate::repair::cut;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -395,6 +396,41 @@ fn non_manifold_vertices(mesh: &IndexedMesh) -> Vec<u32> {
         .into_iter()
         .filter(|(_, link)| is_crowded_or_torn(link));
     bad.map(|(v, _)| v).collect()
+}
+
+/// Whatever goes in, nothing is non-manifold after a cut: by brute force and as `info` counts; the
+/// faces are those of before, corner by corner, the vertices too, and copies behind them; cutting
+/// again changes nothing.
+#[test]
+fn a_cut_leaves_a_manifold_of_the_same_faces() {
+    for_each_case(CASES, |case| {
+        let Case { mesh, options } = case_of(case);
+        let (after, report) = cut(mesh.clone(), options.weld).unwrap();
+        let (before, _) = clean(mesh, report.cleaning.welded_vertices > 0).unwrap();
+        assert_eq!(non_manifold_edges(&after), [[0; 2]; 0], "case {case}");
+        assert_eq!(non_manifold_vertices(&after), [0; 0], "case {case}");
+        for info in [
+            info(after.clone(), false).unwrap(),
+            info_of_file(after.clone()).unwrap(),
+        ] {
+            assert!(info.is_manifold(), "case {case}: {info:?}");
+        }
+        let count = before.positions().len();
+        assert_eq!(bits(&after)[..count], bits(&before), "case {case}");
+        assert_eq!(bits(&after).len(), count + report.vertices_copied);
+        let corners = |mesh: &IndexedMesh| -> Vec<[Bits; 3]> {
+            let at = bits(mesh);
+            let faces = mesh.triangles().iter();
+            faces.map(|t| t.map(|v| at[v as usize])).collect()
+        };
+        assert_eq!(corners(&after), corners(&before), "case {case}");
+        assert_eq!(after.double_sided(), before.double_sided(), "case {case}");
+        let was_manifold =
+            report.non_manifold_edges_in == 0 && report.non_manifold_vertices_in == 0;
+        assert_eq!(report.vertices_copied == 0, was_manifold, "case {case}");
+        let (again, _) = cut(after.clone(), options.weld).unwrap();
+        assert_same(&again, &after, &format!("case {case}"));
+    });
 }
 
 /// How many volumes a complex encloses: its faces less the rank of their boundaries, modulo 2.

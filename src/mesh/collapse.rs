@@ -277,7 +277,7 @@ impl<S: EdgeStore> Mesh<S> {
         }
     }
 
-    fn free_fans(&mut self, v: VertexId) {
+    pub(super) fn free_fans(&mut self, v: VertexId) {
         if let Outgoing::Fans(row) = self.outgoing(v) {
             self.fan_rows.remove(row);
         }
@@ -310,7 +310,7 @@ impl<S: EdgeStore> Mesh<S> {
     }
 
     /// Where a fan of `v` is named by `old`, names it by `new`.
-    fn replace_fan(&mut self, v: VertexId, old: EdgeId, new: EdgeId) {
+    pub(super) fn replace_fan(&mut self, v: VertexId, old: EdgeId, new: EdgeId) {
         match self.outgoing(v) {
             Outgoing::Fan(e) if e == old => self.set_outgoing(v, Outgoing::Fan(new)),
             Outgoing::Fans(row) if self.fan_rows.row(row).binary_search(&old).is_ok() => {

@@ -4,7 +4,7 @@
 use smallvec::SmallVec;
 
 use super::collapse::Collapse;
-use super::link::{Opposite, Outgoing};
+use super::link::Opposite;
 use super::{EdgeId, EdgeStore, FaceId, Mesh, OppositeWord, VertexId};
 
 /// What contracting an edge does.
@@ -210,27 +210,17 @@ impl<S: EdgeStore> Mesh<S> {
             ..
         } = contraction;
         let is_dead = |e: &EdgeId| dead.binary_search(&e.face()).is_ok();
-        let mut outgoing: Vec<Vec<EdgeId>> = around
-            .iter()
-            .map(|&v| self.outgoing_edges(v).filter(|e| !is_dead(e)).collect())
-            .collect();
+        let mut outgoing: Vec<Vec<EdgeId>> = around.iter().map(|&v| self.take_fans(v)).collect();
         // Every row that lists an edge here is made anew.
-        for &v in around {
-            for e in self.outgoing_edges(v).collect::<Vec<_>>() {
-                for side in [e, self.prev(e)] {
-                    if let Opposite::NonManifold(row) = self.opposite(side) {
-                        for e in self.edge_rows.remove(row) {
-                            self.set_opposite(e, Opposite::Boundary);
-                        }
-                    }
+        let sides = outgoing.iter().flatten().flat_map(|&e| [e, self.prev(e)]);
+        for side in sides.collect::<Vec<_>>() {
+            if let Opposite::NonManifold(_) = self.opposite(side) {
+                for e in self.take_star(side) {
+                    self.set_opposite(e, Opposite::Boundary);
                 }
             }
-            if let Outgoing::Fans(row) = self.outgoing(v) {
-                self.fan_rows.remove(row);
-            }
-            self.set_outgoing(v, Outgoing::None);
-            self.live_vertices -= 1;
         }
+        outgoing.iter_mut().for_each(|o| o.retain(|e| !is_dead(e)));
         for e in dead.iter().flat_map(|f| f.edges()) {
             self.store.set_opposite_word(e, OppositeWord::DEAD);
         }
@@ -250,21 +240,8 @@ impl<S: EdgeStore> Mesh<S> {
         named.sort_unstable();
         named.dedup();
         for edge in named.chunk_by(|a, b| a.0 == b.0) {
-            match *edge {
-                [(_, a)] => self.set_opposite(a, Opposite::Boundary),
-                [(_, a), (_, b)] if self.tail(a) == self.head(b) => {
-                    self.set_opposite(a, Opposite::Edge(b));
-                    self.set_opposite(b, Opposite::Edge(a));
-                }
-                _ => {
-                    let row = self
-                        .edge_rows
-                        .insert(edge.iter().map(|&(_, e)| e).collect());
-                    for &(_, e) in edge {
-                        self.set_opposite(e, Opposite::NonManifold(row));
-                    }
-                }
-            }
+            let star: SmallVec<[EdgeId; 2]> = edge.iter().map(|&(_, e)| e).collect();
+            self.link_edge(&star);
         }
         for (&v, outgoing) in around.iter().zip(&mut outgoing) {
             self.find_fans_among(v, outgoing);

@@ -1,6 +1,6 @@
 //! A face between two boundary edges that meet: a step towards closing a gap.
 
-use super::link::{Opposite, Outgoing};
+use super::link::Outgoing;
 use super::{EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 
 impl<S: EdgeStore> Mesh<S> {
@@ -33,21 +33,14 @@ impl<S: EdgeStore> Mesh<S> {
     ///     a     b     →      a ──→ b
     /// ```
     ///
-    /// Returns a, v and b. Needs [`fill_condition(e)`](Self::fill_condition). Costs a walk around v.
+    /// Returns a, v and b. Needs [`fill_condition(e)`](Self::fill_condition). Costs a walk around
+    /// each.
     pub fn fill(&mut self, e: EdgeId, face: FaceId) -> [VertexId; 3] {
         let next = self.next_on_boundary(e).expect("a boundary edge behind");
         let (a, v, b) = (self.tail(e), self.head(e), self.head(next));
-        let [to_a, to_b, to_v] = face.edges();
-        for (edge, tail) in [(to_a, v), (to_b, a), (to_v, b)] {
-            self.store.set_tail(edge, tail);
-        }
-        for (edge, across) in [(to_a, e), (to_v, next)] {
-            self.set_opposite(edge, Opposite::Edge(across));
-            self.set_opposite(across, Opposite::Edge(edge));
-        }
-        self.set_opposite(to_b, Opposite::Boundary);
-        self.set_outgoing(a, Outgoing::Fan(to_b));
-        self.live_faces += 1;
+        self.add_face([v, a, b], face);
+        // The walk around v, closed now, begins where it did: sums along it stay what they were.
+        self.set_outgoing(v, Outgoing::Fan(next));
         [a, v, b]
     }
 }

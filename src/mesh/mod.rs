@@ -10,35 +10,59 @@
 //!
 //! A step around a vertex goes `e → opposite(prev(e))` (paper, section 3). Slots are stable: a
 //! collapse kills faces, edges and a vertex, and moves none, until [`Mesh::compact`].
+//!
+//! | operation | allowed where | on non-manifold edges and vertices |
+//! |---|---|---|
+//! | [`collapse`](Mesh::collapse) | [`link_condition`](Mesh::link_condition): the topology stays | yes |
+//! | [`split_vertex`](Mesh::split_vertex) | [`vertex_split_condition`](Mesh::vertex_split_condition): a collapse undoes it | yes |
+//! | [`flip`](Mesh::flip) | [`flip_condition`](Mesh::flip_condition): two faces, apexes not joined | beside them |
+//! | [`split_edge`](Mesh::split_edge) | [`edge_split_condition`](Mesh::edge_split_condition): everywhere | yes |
+//! | [`split_face`](Mesh::split_face) | [`face_split_condition`](Mesh::face_split_condition): everywhere | yes |
+//! | [`add_face`](Mesh::add_face) | [`add_condition`](Mesh::add_condition): no face is there twice | yes |
+//! | [`remove_face`](Mesh::remove_face) | [`remove_condition`](Mesh::remove_condition): everywhere | yes |
+//!
+//! What they add goes into slots that are dead, of former faces and vertices or
+//! [new](Mesh::new_face).
 
+mod add;
 mod build;
 mod check;
 mod collapse;
 mod compact;
 mod components;
 mod contract;
+mod cut;
 mod disk;
+mod edge_split;
+mod face_split;
 mod fill;
 mod flip;
 mod ids;
 mod link;
+#[cfg(test)]
+mod modify_tests;
 mod non_manifold;
 mod orient;
 mod pinch;
+mod relink;
 mod ring;
+mod slots;
 mod store;
 #[cfg(test)]
 mod tests;
+mod vertex_split;
 
 pub use collapse::Collapse;
 pub use compact::Compaction;
 pub use contract::Contraction;
+pub use cut::Cut;
 pub use disk::Disks;
 pub use ids::{EdgeId, FaceId, VertexId};
 pub use link::{Opposite, Outgoing, RowId};
 pub use orient::{Oriented, turn_round};
 pub use ring::{BoundaryCurve, Fan};
 pub use store::{EdgeStore, Full, Medium, Small, Tier};
+pub use vertex_split::VertexSplit;
 
 use link::{OppositeWord, OutgoingWord};
 use non_manifold::SideTable;

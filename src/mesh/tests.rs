@@ -7,10 +7,10 @@ use crate::for_each_tier;
 use crate::shapes::{self, Shape};
 
 /// A seeded generator (Marsaglia 2003, xorshift), so that every run is the same.
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    fn below(&mut self, n: usize) -> usize {
+    pub(super) fn below(&mut self, n: usize) -> usize {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -18,7 +18,7 @@ impl Random {
     }
 }
 
-fn named_shapes() -> Vec<(&'static str, Shape)> {
+pub(super) fn named_shapes() -> Vec<(&'static str, Shape)> {
     vec![
         ("tetrahedron", shapes::tetrahedron()),
         ("grid", shapes::grid(7, 5)),
@@ -35,7 +35,7 @@ fn named_shapes() -> Vec<(&'static str, Shape)> {
 }
 
 /// A simplicial complex of random triangles over few vertices: everything touches everything.
-fn random_complex(seed: u64) -> (usize, Vec<[u32; 3]>) {
+pub(super) fn random_complex(seed: u64) -> (usize, Vec<[u32; 3]>) {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let vertices = 4 + random.below(14);
     let mut seen = BTreeSet::new();
@@ -52,7 +52,7 @@ fn random_complex(seed: u64) -> (usize, Vec<[u32; 3]>) {
 }
 
 /// A fine surface with random faces glued on, so that collapses have room beside what is singular.
-fn random_surface(seed: u64) -> (usize, Vec<[u32; 3]>) {
+pub(super) fn random_surface(seed: u64) -> (usize, Vec<[u32; 3]>) {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let (positions, mut triangles) = [
         shapes::grid(6, 6),
@@ -163,7 +163,7 @@ fn topology(triangles: &[[u32; 3]]) -> Topology {
     }
 }
 
-fn live_edges<S: EdgeStore>(mesh: &Mesh<S>) -> Vec<EdgeId> {
+pub(super) fn live_edges<S: EdgeStore>(mesh: &Mesh<S>) -> Vec<EdgeId> {
     mesh.edges().collect()
 }
 

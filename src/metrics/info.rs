@@ -61,6 +61,48 @@ pub fn info(mesh: IndexedMesh, weld: bool) -> Result<Info> {
     Ok(info_of_clean(mesh, vertices, triangles, cleaning))
 }
 
+/// Counts what is in a mesh as its file means it: with equal positions welded, as decimation does,
+/// unless the file's own numbering is a manifold that welding would spoil. That is what a
+/// [cut](crate::repair::cut) leaves, or parts that touch.
+///
+/// A file in which no two faces share a vertex (STL) says nothing of neighbours; it is welded
+/// whenever that gives it any.
+///
+/// # Errors
+/// As [`clean`].
+pub fn info_of_file(mesh: IndexedMesh) -> Result<Info> {
+    let welded = info(mesh.clone(), true)?;
+    if welded.is_manifold() || welded.cleaning.welded_vertices == 0 {
+        return Ok(welded);
+    }
+    let numbered = info(mesh, false)?;
+    let corners = 3 * numbered.cleaning.kept_faces;
+    let is_soup = numbered.cleaning.kept_vertices == corners && welded.has_inner_edges();
+    Ok(if numbered.is_manifold() && !is_soup {
+        numbered
+    } else {
+        welded
+    })
+}
+
+impl Info {
+    /// Whether every edge has at most two faces and every vertex one fan.
+    pub fn is_manifold(&self) -> bool {
+        self.non_manifold_edges == 0 && self.non_manifold_vertices == 0
+    }
+
+    /// Whether two faces share an edge that has no others.
+    fn has_inner_edges(&self) -> bool {
+        let Cleaning {
+            kept_vertices: vertices,
+            kept_faces: faces,
+            ..
+        } = self.cleaning;
+        let edges = (vertices + faces) as i64 - self.euler_characteristic;
+        edges > (self.boundary_edges + self.non_manifold_edges) as i64
+    }
+}
+
 /// [`info`] of a mesh that has been cleaned, and had so many vertices and triangles before.
 pub(super) fn info_of_clean(
     mesh: IndexedMesh,
@@ -294,6 +336,39 @@ mod tests {
         );
         assert_eq!((strip.euler_characteristic, strip.genus), (0, None));
         assert_eq!((strip.boundary_loops, strip.boundary_edges), (1, 24));
+    }
+
+    /// Two squares, each of two faces, that touch in a corner or along a side: manifold as numbered,
+    /// and counted so. Two faces a square that share nothing, a soup, are welded.
+    #[test]
+    fn what_welding_would_spoil_is_kept_apart() {
+        let square = |x: f32, y: f32| [[x, y], [x + 1., y], [x + 1., y + 1.], [x, y + 1.]];
+        let plane = |corners: &[[f32; 2]]| -> Vec<glam::Vec3> {
+            corners.iter().map(|c| [c[0], c[1], 0.].into()).collect()
+        };
+        let (a, b) = (square(0., 0.), square(1., 1.));
+        let faces = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        let count = |positions, faces| {
+            let mesh = IndexedMesh::new(positions, faces).unwrap();
+            let info = info_of_file(mesh).unwrap();
+            (
+                info.non_manifold_vertices,
+                info.components,
+                info.cleaning.welded_vertices,
+            )
+        };
+        let positions = plane(&[a, b].concat());
+        assert_eq!(count(positions.clone(), faces.clone()), (0, 2, 0));
+        let soup: Vec<_> = faces
+            .iter()
+            .flatten()
+            .map(|&v: &u32| positions[v as usize])
+            .collect();
+        let apart = vec![[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]];
+        assert_eq!(count(soup, apart), (1, 1, 5));
+        // Along a side: welding makes one surface of them.
+        let positions = plane(&[a, square(1., 0.)].concat());
+        assert_eq!(count(positions, faces), (0, 1, 2));
     }
 
     /// One turned face: three of its edges disagree, and it can be turned back.

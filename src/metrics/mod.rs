@@ -5,4 +5,4 @@ mod info;
 mod surface;
 
 pub use compare::{CompareOptions, Comparison, Distances, Reference, TwoSided, compare};
-pub use info::{Info, info};
+pub use info::{Info, info, info_of_file};

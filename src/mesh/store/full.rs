@@ -87,6 +87,18 @@ impl EdgeStore for Full {
         }
     }
 
+    fn push_face(&mut self) {
+        let first = self.0.len();
+        self.0
+            .extend([(2, 1), (0, 2), (1, 0)].map(|(prev, next)| Edge {
+                tail: VertexId::new(0),
+                head: VertexId::new(0),
+                prev: EdgeId::new(first + prev),
+                next: EdgeId::new(first + next),
+                opposite: OppositeWord::DEAD,
+            }));
+    }
+
     fn truncate(&mut self, faces: usize) {
         self.0.truncate(3 * faces);
         self.0.shrink_to_fit();

@@ -82,6 +82,15 @@ impl EdgeStore for Medium {
         }
     }
 
+    fn push_face(&mut self) {
+        let first = self.0.len();
+        self.0.extend([2, 0, 1].map(|prev| Edge {
+            head: VertexId::new(0),
+            prev: EdgeId::new(first + prev),
+            opposite: OppositeWord::DEAD,
+        }));
+    }
+
     fn truncate(&mut self, faces: usize) {
         self.0.truncate(3 * faces);
         self.0.shrink_to_fit();

@@ -96,6 +96,9 @@ pub trait EdgeStore: Clone + Send + Sync + Sized {
     /// Moves the three edges of one face slot to another, a lower one, links untouched.
     fn move_face(&mut self, from: usize, to: usize);
 
+    /// Adds a dead face slot.
+    fn push_face(&mut self);
+
     /// Drops every face slot from `faces` on.
     fn truncate(&mut self, faces: usize);
 

@@ -73,6 +73,14 @@ impl EdgeStore for Small {
         self.0.copy_within(3 * from..3 * from + 3, 3 * to);
     }
 
+    fn push_face(&mut self) {
+        let edge = Edge {
+            head: VertexId::new(0),
+            opposite: OppositeWord::DEAD,
+        };
+        self.0.extend([edge; 3]);
+    }
+
     fn truncate(&mut self, faces: usize) {
         self.0.truncate(3 * faces);
         self.0.shrink_to_fit();
