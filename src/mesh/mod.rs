@@ -39,8 +39,8 @@ pub use orient::{Oriented, turn_round};
 pub use ring::{BoundaryCurve, Fan};
 pub use store::{EdgeStore, Full, Medium, Small, Tier};
 
-use link::{OppositeWord, OutgoingWord};
-use non_manifold::SideTable;
+pub(crate) use link::{OppositeWord, OutgoingWord};
+pub(crate) use non_manifold::SideTable;
 use smallvec::SmallVec;
 
 /// A triangle mesh's connectivity in one memory tier.
