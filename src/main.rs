@@ -16,10 +16,11 @@ use decimate::decimate::{Progress, decimate_with_progress, peak_rss_bytes};
 use decimate::error::Error;
 use decimate::io::{self, ReadOptions, WriteOptions};
 use decimate::metrics::{CompareOptions, Reference, info};
+use decimate::structures::measure_polygons;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use cli::{Cli, Command, CompareArgs, InfoArgs, Run};
+use cli::{Cli, Command, CompareArgs, InfoArgs, Run, StructuresArgs};
 use text::Compared;
 
 /// Exit status of a run that stopped short under `--strict`.
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
     let done = match &cli.command {
         Some(Command::Info(args)) => show_info(args),
         Some(Command::Compare(args)) => show_comparison(args),
+        Some(Command::Structures(args)) => show_structures(args),
         None => run(&cli.run),
     };
     done.unwrap_or_else(|error| {
@@ -152,6 +154,23 @@ fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
     } else {
         io::write_file(Path::new("-"), |out| {
             out.write_all(text::comparison(&compared).as_bytes())
+        })?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show_structures(args: &StructuresArgs) -> Result<ExitCode, Error> {
+    let read_options = ReadOptions {
+        format: args.input_format,
+        ..ReadOptions::default()
+    };
+    let mesh = io::read_polygons(&args.mesh, &read_options)?;
+    let measured = measure_polygons(mesh).map_err(|error| name_mesh(error, &args.mesh))?;
+    if args.json {
+        write_json(Path::new("-"), &measured)?;
+    } else {
+        io::write_file(Path::new("-"), |out| {
+            out.write_all(text::structures(&measured).as_bytes())
         })?;
     }
     Ok(ExitCode::SUCCESS)
