@@ -364,6 +364,28 @@ fn what_is_not_manifold_is_refused_with_the_place() {
     assert!(DirectedEdges::<Small>::build(&twice.0, &twice.1).is_err());
 }
 
+/// Around a vertex inside, each neighbour and the one behind it have a face with the vertex.
+fn rings_go_round<S: Structure<3>>((positions, triangles): &Shape) {
+    let structure = S::build(positions, triangles).unwrap();
+    let oracle = Oracle::of(triangles);
+    for v in 0..positions.len() as u32 {
+        let mut ring = Vec::new();
+        structure.one_ring(Vertex::new(v as usize), |x| ring.push(x.index() as u32));
+        for (i, &x) in ring.iter().enumerate() {
+            let y = ring[(i + 1) % ring.len()];
+            let mut faces = oracle.faces_of_vertex[&v].iter();
+            let is_face = faces.any(|&f| [x, y].iter().all(|v| oracle.faces[f].contains(v)));
+            assert!(is_face, "{}: {ring:?} around {v}", S::DESCRIPTION.name);
+        }
+    }
+}
+
+#[test]
+fn links_lead_around_a_vertex_in_order() {
+    for_each_linked_structure!(rings_go_round(&shapes::icosphere(2)));
+    for_each_linked_structure!(rings_go_round(&shapes::torus(9, 6)));
+}
+
 /// By the words that are stored, a large closed mesh takes the bytes that paper and chapter state.
 fn has_the_stated_size<S: Structure<3>>(shape: &Shape) {
     let (positions, triangles) = shape;
