@@ -266,12 +266,15 @@ pub fn structures(measured: &Measured) -> String {
         text += &format!("; {} {face}s left out", measured.dropped_faces);
     }
     text += &format!("\n\n{}\n{}", bytes(measured), times(measured));
-    let mut separator = "\n";
-    for row in &measured.structures {
-        if let Some(why) = &row.cannot_carry {
-            text += &format!("{separator}{} cannot carry it: {why}\n", row.structure);
-            separator = "";
-        }
+    let refused = measured.structures.iter().filter_map(|row| {
+        let why = row.cannot_carry.as_ref()?;
+        Some(format!("{} cannot carry it: {why}\n", row.structure))
+    });
+    let refused: String = refused.collect();
+    if !refused.is_empty() {
+        text += &format!(
+            "\n{refused}Vertices are counted from 0, those that cleaning drops left out.\n"
+        );
     }
     text
 }
@@ -298,12 +301,12 @@ fn bytes(measured: &Measured) -> String {
         ("structure".into(), &|row| row.structure.into()),
         (format!("bytes/{face}"), &|row| number(row.per_face.bytes)),
         ("formula".into(), &|row| {
-            number(Some(row.per_face.bytes_limit))
+            number(Some(row.per_face.bytes_formula))
         }),
         ("stated".into(), &|row| whole(row.per_face.bytes_stated)),
         ("bytes/vertex".into(), &|row| number(row.bytes_per_vertex)),
         ("formula".into(), &|row| {
-            number(Some(row.bytes_per_vertex_limit))
+            number(Some(row.bytes_per_vertex_formula))
         }),
         ("stated".into(), &|row| whole(row.bytes_per_vertex_stated)),
         ("redundant".into(), &redundant),

@@ -59,7 +59,8 @@ pub struct Measured {
 pub struct Row {
     /// Its name.
     pub structure: &'static str,
-    /// Why it cannot carry this mesh; then nothing is measured.
+    /// Why it cannot carry this mesh; then nothing is measured. Vertices are counted from 0, those that
+    /// cleaning drops left out.
     pub cannot_carry: Option<String>,
     /// What is counted by faces.
     #[serde(flatten)]
@@ -67,13 +68,14 @@ pub struct Row {
     /// The bytes a vertex that the chapter states.
     pub bytes_per_vertex_stated: Option<u32>,
     /// Those of a large closed mesh, by the words that are stored.
-    pub bytes_per_vertex_limit: f64,
+    pub bytes_per_vertex_formula: f64,
     /// Those of this mesh.
     pub bytes_per_vertex: Option<f64>,
     /// All of this mesh.
     pub bytes: Option<usize>,
     /// The share of them beyond one position a vertex and one reference a corner, from which all else
-    /// can be computed (shared vertices: the paper's "lower limit", section 1).
+    /// can be computed (shared vertices: the paper's "lower limit", section 1); 0 where there are fewer,
+    /// as in individual triangles that share nothing.
     pub redundancy_share: Option<f64>,
     /// Whether it carries edges of three faces and vertices of several fans.
     pub carries_non_manifold: bool,
@@ -99,7 +101,7 @@ pub struct PerFace {
     /// The bytes that the paper states.
     pub bytes_stated: Option<u32>,
     /// Those of a large closed mesh, by the words that are stored.
-    pub bytes_limit: f64,
+    pub bytes_formula: f64,
     /// Those of this mesh.
     pub bytes: Option<f64>,
     /// Building from positions and faces.
@@ -111,7 +113,7 @@ impl Serialize for PerFace {
         let face = self.face_name;
         let mut map = serializer.serialize_map(Some(4))?;
         map.serialize_entry(&format!("bytes_per_{face}_stated"), &self.bytes_stated)?;
-        map.serialize_entry(&format!("bytes_per_{face}_limit"), &self.bytes_limit)?;
+        map.serialize_entry(&format!("bytes_per_{face}_formula"), &self.bytes_formula)?;
         map.serialize_entry(&format!("bytes_per_{face}"), &self.bytes)?;
         map.serialize_entry(&format!("construct_ns_per_{face}"), &self.construct_ns)?;
         map.end()
@@ -405,19 +407,19 @@ impl<const K: usize> Bench<'_, K> {
 
     fn row_and_structure<S: Structure<K>>(&self) -> (Row, Option<S>) {
         let is = S::DESCRIPTION;
-        let (bytes_limit, bytes_per_vertex_limit) = is.words.limits(K);
+        let (bytes_formula, bytes_per_vertex_formula) = is.words.limits(K);
         let mut row = Row {
             structure: is.name,
             cannot_carry: None,
             per_face: PerFace {
                 face_name: self.face_name,
                 bytes_stated: is.stated_bytes_per_face,
-                bytes_limit,
+                bytes_formula,
                 bytes: None,
                 construct_ns: None,
             },
             bytes_per_vertex_stated: is.stated_bytes_per_vertex,
-            bytes_per_vertex_limit,
+            bytes_per_vertex_formula,
             bytes_per_vertex: None,
             bytes: None,
             redundancy_share: None,
@@ -443,7 +445,7 @@ impl<const K: usize> Bench<'_, K> {
         row.per_face.bytes = per(bytes as f64, self.faces.len());
         row.bytes_per_vertex = per(bytes as f64, self.positions.len());
         row.bytes = Some(bytes);
-        row.redundancy_share = per(bytes as f64 - least as f64, bytes);
+        row.redundancy_share = per(bytes.saturating_sub(least) as f64, bytes);
         row.queries = self.query_times(&structure);
         (row, Some(structure))
     }

@@ -577,7 +577,7 @@ fn measuring_fills_the_table() {
     assert_eq!(sphere.structures.len(), 10);
     for row in &sphere.structures {
         assert_eq!(row.cannot_carry, None);
-        let limit = row.per_face.bytes_limit;
+        let limit = row.per_face.bytes_formula;
         assert!((row.per_face.bytes.unwrap() / limit - 1.0).abs() < 0.02);
         for query in Query::ALL {
             let is_answered = row.queries.get(query).ns.is_some_and(|ns| ns > 0.0);
