@@ -20,7 +20,8 @@ use decimate::mesh::Tier;
     override_usage = "decimate INPUT -o OUTPUT [--ratio R] [--triangles N] [--max-error E] [OPTIONS]\n       \
                       decimate info MESH [--json]\n       \
                       decimate compare REFERENCE MESH... [--json]\n       \
-                      decimate repair INPUT -o OUTPUT --cut [OPTIONS]",
+                      decimate repair INPUT -o OUTPUT --cut [OPTIONS]\n       \
+                      decimate structures MESH [--json]",
     after_help = "Exit status: 0 done (also when stopped short, which is said), 1 a file or mesh could not be \
                   processed, 2 wrong usage, 3 stopped short under --strict.\n\n\
                   Examples:\n  \
@@ -46,6 +47,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Makes a mesh manifold.
     Repair(RepairArgs),
+    /// Measures a mesh in the structures that the paper compares: bytes, building, queries, flips.
+    Structures(StructuresArgs),
 }
 
 /// The arguments of `decimate repair`.
@@ -85,6 +88,20 @@ pub struct RepairArgs {
     /// Say nothing but errors.
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// The arguments of `decimate structures`.
+#[derive(Debug, Args)]
+pub struct StructuresArgs {
+    /// The mesh: PLY, OBJ, STL or OFF; - for standard input. One of quads alone is measured in the
+    /// structure for quads, others as triangles.
+    pub mesh: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// The mesh's format, where neither content nor extension says it.
+    #[arg(long, value_name = "FORMAT")]
+    pub input_format: Option<Format>,
 }
 
 /// The arguments of `decimate compare`.

@@ -243,6 +243,76 @@ fn some_or_none<T>(list: Vec<T>, says_something: impl Fn(&T) -> bool) -> Vec<T> 
     }
 }
 
+/// The triangles that a polygon is cut into: the fan around its first corner; none where it has fewer
+/// than three.
+fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let (&first, rest) = corners.split_first().unwrap_or((&0, &[]));
+    rest.windows(2).map(move |pair| [first, pair[0], pair[1]])
+}
+
+/// A mesh with its polygons as a file has them, of three corners or more each.
+///
+/// For structures of other faces than triangles; everything else takes the triangles that
+/// [`fanned`](Self::fanned) cuts them into.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PolygonMesh {
+    origin: DVec3,
+    positions: Vec<Vec3>,
+    polygons: Polygons,
+}
+
+/// Lists of corners, one behind the other.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Polygons {
+    corners: Vec<u32>,
+    /// Where each polygon's corners end.
+    ends: Vec<usize>,
+}
+
+impl Polygons {
+    fn push(&mut self, corners: &[u32]) {
+        if corners.len() >= 3 {
+            self.corners.extend_from_slice(corners);
+            self.ends.push(self.corners.len());
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[u32]> + '_ {
+        let begins = std::iter::once(0).chain(self.ends.iter().copied());
+        begins
+            .zip(&self.ends)
+            .map(|(begin, &end)| &self.corners[begin..end])
+    }
+}
+
+impl PolygonMesh {
+    /// The vertices, relative to [`IndexedMesh::origin`].
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The corners of each polygon.
+    pub fn polygons(&self) -> impl Iterator<Item = &[u32]> + '_ {
+        self.polygons.iter()
+    }
+
+    /// The polygons, where there are some and all have four corners.
+    pub fn quads(&self) -> Option<Vec<[u32; 4]>> {
+        let quad = |polygon: &[u32]| <[u32; 4]>::try_from(polygon).ok();
+        let quads: Option<Vec<_>> = self.polygons().map(quad).collect();
+        quads.filter(|quads| !quads.is_empty())
+    }
+
+    /// The mesh with each polygon cut into the fan of triangles around its first corner.
+    ///
+    /// # Errors
+    /// As [`IndexedMesh::new`], where there are too many triangles.
+    pub fn fanned(self) -> Result<IndexedMesh> {
+        let triangles = self.polygons().flat_map(fan).collect();
+        IndexedMesh::with_origin(self.origin, self.positions, triangles)
+    }
+}
+
 fn check_sizes(vertices: usize, triangles: usize) -> Result<()> {
     if triangles > MAX_TRIANGLES {
         return Err(Error::InvalidMesh(format!(
@@ -272,7 +342,23 @@ fn bounds(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
 pub struct MeshBuilder {
     singles: Vec<Vec3>,
     doubles: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    faces: Faces,
+    weights: Vec<f32>,
+}
+
+/// What becomes of the faces that a reader finds.
+#[derive(Debug)]
+enum Faces {
+    /// They are cut into triangles.
+    Triangles(Vec<[u32; 3]>),
+    /// They stay as they are.
+    Polygons(Polygons),
+}
+
+impl Default for Faces {
+    fn default() -> Self {
+        Faces::Triangles(Vec::new())
+    }
 }
 
 /// How many times farther from zero than its own size a mesh of doubles must lie before it gets an
@@ -280,6 +366,14 @@ pub struct MeshBuilder {
 const FAR: f64 = 16.0;
 
 impl MeshBuilder {
+    /// A builder that leaves polygons whole, to be [finished](Self::finish_polygons) as such.
+    pub fn of_polygons() -> Self {
+        Self {
+            faces: Faces::Polygons(Polygons::default()),
+            ..Self::default()
+        }
+    }
+
     /// Makes room for exactly so many more vertices, if there is room for them.
     pub fn reserve_vertices(&mut self, vertices: usize) {
         // Without it the array grows as the vertices come.
@@ -288,8 +382,10 @@ impl MeshBuilder {
 
     /// Makes room for exactly so many more triangles, if there is room for them.
     pub fn reserve_triangles(&mut self, triangles: usize) {
-        let triangles = triangles.min(MAX_TRIANGLES);
-        let _ = self.triangles.try_reserve_exact(triangles);
+        // Polygons are fewer than their triangles, and grow as they come.
+        if let Faces::Triangles(list) = &mut self.faces {
+            let _ = list.try_reserve_exact(triangles.min(MAX_TRIANGLES));
+        }
     }
 
     /// Adds vertices with single-precision coordinates.
@@ -330,21 +426,32 @@ impl MeshBuilder {
     /// Adds a triangle. Its indices are checked by [`finish`](Self::finish); a reader that can name
     /// the place in its file checks them before.
     pub fn push_triangle(&mut self, triangle: [u32; 3]) {
-        self.triangles.push(triangle);
+        match &mut self.faces {
+            Faces::Triangles(list) => list.push(triangle),
+            Faces::Polygons(polygons) => polygons.push(&triangle),
+        }
     }
 
     /// Adds triangles, as [`push_triangle`](Self::push_triangle) does.
     pub fn push_triangles(&mut self, triangles: impl Iterator<Item = [u32; 3]>) {
-        self.triangles.extend(triangles);
+        match &mut self.faces {
+            Faces::Triangles(list) => list.extend(triangles),
+            Faces::Polygons(polygons) => triangles.for_each(|t| polygons.push(&t)),
+        }
     }
 
-    /// Adds a polygon as the fan of triangles around its first corner.
+    /// Adds a polygon, as the fan of triangles around its first corner unless polygons stay whole.
+    /// One of less than three corners is none.
     pub fn push_polygon(&mut self, corners: &[u32]) {
-        if let [first, rest @ ..] = corners {
-            for pair in rest.windows(2) {
-                self.triangles.push([*first, pair[0], pair[1]]);
-            }
+        match &mut self.faces {
+            Faces::Triangles(list) => list.extend(fan(corners)),
+            Faces::Polygons(polygons) => polygons.push(corners),
         }
+    }
+
+    /// Weighs the next vertex; see [`IndexedMesh::with_weights`].
+    pub fn push_weight(&mut self, weight: f32) {
+        self.weights.push(weight);
     }
 
     /// The vertices so far.
@@ -352,29 +459,69 @@ impl MeshBuilder {
         self.singles.len().max(self.doubles.len())
     }
 
-    /// The triangles so far.
-    pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
+    /// The faces so far: triangles, or polygons where these stay whole.
+    pub fn face_count(&self) -> usize {
+        match &self.faces {
+            Faces::Triangles(list) => list.len(),
+            Faces::Polygons(polygons) => polygons.ends.len(),
+        }
     }
 
     /// The mesh, with the origin that its coordinates ask for.
     ///
     /// # Errors
-    /// As [`IndexedMesh::new`].
+    /// As [`IndexedMesh::new`] and [`IndexedMesh::with_weights`].
     pub fn finish(mut self) -> Result<IndexedMesh> {
-        check_sizes(self.vertex_count(), self.triangles.len())?;
-        self.triangles.shrink_to_fit();
+        let mut triangles = match std::mem::take(&mut self.faces) {
+            Faces::Triangles(list) => list,
+            Faces::Polygons(polygons) => polygons.iter().flat_map(fan).collect(),
+        };
+        check_sizes(self.vertex_count(), triangles.len())?;
+        triangles.shrink_to_fit();
+        let weights = std::mem::take(&mut self.weights);
+        let (origin, positions) = self.finish_positions();
+        IndexedMesh::with_origin(origin, positions, triangles)?.with_weights(weights)
+    }
+
+    /// The mesh with its polygons as they came.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] where a polygon names a vertex that is not there, or there are more than
+    /// 2³¹−1 vertices.
+    pub fn finish_polygons(mut self) -> Result<PolygonMesh> {
+        let polygons = match std::mem::take(&mut self.faces) {
+            Faces::Polygons(polygons) => polygons,
+            Faces::Triangles(list) => {
+                let mut polygons = Polygons::default();
+                list.iter().for_each(|t| polygons.push(t));
+                polygons
+            }
+        };
+        check_sizes(self.vertex_count(), 0)?;
+        let (origin, positions) = self.finish_positions();
+        let n = positions.len();
+        let outside = |polygon: &&[u32]| polygon.iter().any(|&v| v as usize >= n);
+        if let Some(polygon) = polygons.iter().find(outside) {
+            return Err(Error::InvalidMesh(format!(
+                "a polygon uses vertices {polygon:?}; the mesh has {n} (counted from 0)"
+            )));
+        }
+        Ok(PolygonMesh {
+            origin,
+            positions,
+            polygons,
+        })
+    }
+
+    /// The positions, relative to the origin that they ask for.
+    fn finish_positions(mut self) -> (DVec3, Vec<Vec3>) {
         if self.doubles.is_empty() {
             self.singles.shrink_to_fit();
-            return IndexedMesh::new(self.singles, self.triangles);
+            return (DVec3::ZERO, self.singles);
         }
         let origin = origin_for(&self.doubles);
-        let positions = self
-            .doubles
-            .iter()
-            .map(|&p| (p - origin).as_vec3())
-            .collect();
-        IndexedMesh::with_origin(origin, positions, self.triangles)
+        let relative = |&p: &DVec3| (p - origin).as_vec3();
+        (origin, self.doubles.iter().map(relative).collect())
     }
 }
 
@@ -407,6 +554,56 @@ fn origin_for(points: &[DVec3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Left whole, polygons are what came, those of less than three corners left out; cut later, they
+    /// are the triangles that they would have been at once.
+    #[test]
+    fn polygons_can_stay_whole() {
+        let fill = |builder: &mut MeshBuilder| {
+            (0..6).for_each(|i| {
+                builder.push_single([i as f32, 0.0, 0.0]);
+            });
+            builder.push_polygon(&[0, 1, 2, 3]);
+            builder.push_triangles([[3, 2, 4], [4, 2, 5]].into_iter());
+            builder.push_polygon(&[1, 2]);
+            builder.push_polygon(&[]);
+            builder.push_polygon(&[5, 4, 3, 2, 1]);
+            builder.push_triangle([0, 1, 5]);
+        };
+        let mut builder = MeshBuilder::of_polygons();
+        fill(&mut builder);
+        assert_eq!(builder.face_count(), 5);
+        let whole = builder.finish_polygons().unwrap();
+        let corners: Vec<&[u32]> = whole.polygons().collect();
+        let expected: [&[u32]; 5] = [
+            &[0, 1, 2, 3],
+            &[3, 2, 4],
+            &[4, 2, 5],
+            &[5, 4, 3, 2, 1],
+            &[0, 1, 5],
+        ];
+        assert_eq!(corners, expected);
+        assert_eq!(whole.quads(), None);
+        let mut builder = MeshBuilder::default();
+        fill(&mut builder);
+        assert_eq!(whole.fanned().unwrap(), builder.finish().unwrap());
+    }
+
+    #[test]
+    fn only_quads_are_quads() {
+        let mut builder = MeshBuilder::of_polygons();
+        (0..4).for_each(|i| {
+            builder.push_single([i as f32, 0.0, 0.0]);
+        });
+        builder.push_polygon(&[0, 1, 2, 3]);
+        let quads = builder.finish_polygons().unwrap().quads();
+        assert_eq!(quads, Some(vec![[0, 1, 2, 3]]));
+        assert_eq!(PolygonMesh::default().quads(), None);
+        let mut builder = MeshBuilder::of_polygons();
+        builder.push_polygon(&[0, 1, 2, 3]);
+        let error = builder.finish_polygons().unwrap_err().to_string();
+        assert!(error.starts_with("a polygon uses vertices [0, 1, 2, 3]; the mesh has 0"));
+    }
 
     /// A float file's coordinates keep their bits, also far from zero.
     #[test]

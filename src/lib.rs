@@ -20,7 +20,8 @@
 //! Data flows one way: [`io`] makes an [`indexed_mesh::IndexedMesh`], [`clean`] makes a simplicial
 //! complex of it, [`decimate`] turns it into another over a [`mesh::Mesh`] in one of three memory
 //! tiers, [`io`] writes it, [`metrics`] says what is in it, [`repair`] makes it manifold. [`spatial`]
-//! puts positions in an order in which neighbours stand together.
+//! puts positions in an order in which neighbours stand together. [`structures`] holds the mesh
+//! structures that the paper compares, for comparison and teaching.
 //!
 //! # Limits
 //! At most 2³¹−1 directed edges (715 million triangles) and 2³¹−1 vertices. Coordinates are single
@@ -38,3 +39,4 @@ pub mod repair;
 #[cfg(test)]
 mod shapes;
 pub mod spatial;
+pub mod structures;

@@ -17,10 +17,11 @@ use decimate::error::Error;
 use decimate::io::{self, Format, ReadOptions, WriteOptions};
 use decimate::metrics::{CompareOptions, Reference, info, info_of_file};
 use decimate::repair;
+use decimate::structures::measure_polygons;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use cli::{Cli, Command, CompareArgs, InfoArgs, RepairArgs, Run};
+use cli::{Cli, Command, CompareArgs, InfoArgs, RepairArgs, Run, StructuresArgs};
 use text::Compared;
 
 /// Exit status of a run that stopped short under `--strict`.
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         Some(Command::Info(args)) => show_info(args),
         Some(Command::Compare(args)) => show_comparison(args),
         Some(Command::Repair(args)) => run_repair(args),
+        Some(Command::Structures(args)) => show_structures(args),
         None => run(&cli.run),
     };
     done.unwrap_or_else(|error| {
@@ -202,6 +204,23 @@ fn check_report(report: Option<&Path>, input: &Path, output: &Path) -> Result<()
         }
     }
     io::check_place(report)
+}
+
+fn show_structures(args: &StructuresArgs) -> Result<ExitCode, Error> {
+    let read_options = ReadOptions {
+        format: args.input_format,
+        ..ReadOptions::default()
+    };
+    let mesh = io::read_polygons(&args.mesh, &read_options)?;
+    let measured = measure_polygons(mesh).map_err(|error| name_mesh(error, &args.mesh))?;
+    if args.json {
+        write_json(Path::new("-"), &measured)?;
+    } else {
+        io::write_file(Path::new("-"), |out| {
+            out.write_all(text::structures(&measured).as_bytes())
+        })?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Sets the number of threads; more than eight a processor would only cost their stacks.

@@ -5,6 +5,7 @@ use std::path::Path;
 use decimate::decimate::{Report, StopReason};
 use decimate::metrics::{Comparison, Info, TwoSided};
 use decimate::repair::CutReport;
+use decimate::structures::{Cost, Measured, Query, Row};
 use serde::Serialize;
 
 /// A mesh held against the reference, with the names of both files.
@@ -270,4 +271,140 @@ pub fn comparison(compared: &[Compared]) -> String {
     let first_row = text.find('\n').map_or(0, |end| end + 1);
     text.insert_str(first_row, &header);
     text
+}
+
+/// The structures as two tables, a row each: the paper's Table 1 with what was measured beside it,
+/// and times; then why a row is empty.
+pub fn structures(measured: &Measured) -> String {
+    let face = measured.face_name;
+    let mut text = format!(
+        "{} {face}s, {} vertices, {} edges ({} boundary, {} non-manifold)",
+        measured.faces,
+        measured.vertices,
+        measured.edges,
+        measured.boundary_edges,
+        measured.non_manifold_edges,
+    );
+    if measured.dropped_faces > 0 {
+        text += &format!("; {} {face}s left out", measured.dropped_faces);
+    }
+    text += &format!("\n\n{}\n{}", bytes(measured), times(measured));
+    let refused = measured.structures.iter().filter_map(|row| {
+        let why = row.cannot_carry.as_ref()?;
+        Some(format!("{} cannot carry it: {why}\n", row.structure))
+    });
+    let refused: String = refused.collect();
+    if !refused.is_empty() {
+        text += &format!(
+            "\n{refused}Vertices are counted from 0, those that cleaning drops left out.\n"
+        );
+    }
+    text
+}
+
+/// What the structures store.
+fn bytes(measured: &Measured) -> String {
+    let face = measured.face_name;
+    let note = format!(
+        "Bytes. Formula: a large closed mesh by the words that are stored. Stated: by the paper a {face}, \
+         by the chapter a vertex.\nM stored, C computed in constant time, - neither.\n"
+    );
+    let redundant = |row: &Row| {
+        let share = row.redundancy_share;
+        share.map_or("-".into(), |share| format!("{:.0} %", 100.0 * share))
+    };
+    let carries = |row: &Row| {
+        String::from(if row.carries_non_manifold {
+            "yes"
+        } else {
+            "no"
+        })
+    };
+    let columns: [Column; 13] = [
+        ("structure".into(), &|row| row.structure.into()),
+        (format!("bytes/{face}"), &|row| number(row.per_face.bytes)),
+        ("formula".into(), &|row| {
+            number(Some(row.per_face.bytes_formula))
+        }),
+        ("stated".into(), &|row| whole(row.per_face.bytes_stated)),
+        ("bytes/vertex".into(), &|row| number(row.bytes_per_vertex)),
+        ("formula".into(), &|row| {
+            number(Some(row.bytes_per_vertex_formula))
+        }),
+        ("stated".into(), &|row| whole(row.bytes_per_vertex_stated)),
+        ("redundant".into(), &redundant),
+        ("non-manifold".into(), &carries),
+        ("neighbours".into(), &|row| {
+            row.neighbourhood.symbol().into()
+        }),
+        ("point".into(), &|row| row.point_reference.symbol().into()),
+        ("prev".into(), &|row| row.previous_edge.symbol().into()),
+        ("next".into(), &|row| row.next_edge.symbol().into()),
+    ];
+    note + &table(&columns, &measured.structures)
+}
+
+/// What building, questions and modification take.
+fn times(measured: &Measured) -> String {
+    let face = measured.face_name;
+    let note = format!(
+        "Nanoseconds: build a {face}, queries and flips at random places. * looks at every {face}.\n"
+    );
+    let query = |query: Query| {
+        move |row: &Row| {
+            let time = row.queries.get(query);
+            let mark = if time.cost == Cost::Search { "*" } else { "" };
+            time.ns.map_or("-".into(), |ns| number(Some(ns)) + mark)
+        }
+    };
+    let queries = Query::ALL.map(|q| (q.symbol().to_string(), query(q)));
+    let mut columns: Vec<Column> = vec![
+        ("structure".into(), &|row| row.structure.into()),
+        ("build".into(), &|row| number(row.per_face.construct_ns)),
+    ];
+    for (name, cell) in &queries {
+        columns.push((name.clone(), cell));
+    }
+    columns.push(("flip".into(), &|row| number(row.edge_flip_ns)));
+    note + &table(&columns, &measured.structures)
+}
+
+/// A column: its name, and what stands in a row.
+type Column<'a> = (String, &'a dyn Fn(&Row) -> String);
+
+/// Columns side by side, as wide as they must be; the first to the left, the others to the right.
+fn table(columns: &[Column], rows: &[Row]) -> String {
+    let width = |(name, cell): &Column| {
+        let cells = rows.iter().map(|row| cell(row).chars().count());
+        cells.chain([name.chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = columns.iter().map(width).collect();
+    let line = |cells: &mut dyn Iterator<Item = String>| {
+        let mut line = String::new();
+        for (i, (cell, width)) in cells.zip(&widths).enumerate() {
+            line += &match i {
+                0 => format!("{cell:width$}"),
+                _ => format!("  {cell:>width$}"),
+            };
+        }
+        line.trim_end().to_string() + "\n"
+    };
+    let mut text = line(&mut columns.iter().map(|(name, _)| name.clone()));
+    for row in rows {
+        text += &line(&mut columns.iter().map(|(_, cell)| cell(row)));
+    }
+    text
+}
+
+/// A measured number with as many places as it deserves.
+fn number(x: Option<f64>) -> String {
+    match x {
+        None => "-".into(),
+        Some(x) if x < 1000.0 => format!("{x:.1}"),
+        Some(x) => format!("{x:.0}"),
+    }
+}
+
+fn whole(x: Option<u32>) -> String {
+    x.map_or("-".into(), |x| x.to_string())
 }

@@ -1110,6 +1110,168 @@ fn info_is_a_table_too() {
     }
 }
 
+/// The bytes of the paper's Table 1 and of the chapter beside those measured, on a mesh with a boundary;
+/// on one with a non-manifold edge a reason where the paper's table says no.
+#[test]
+fn structures_measures_the_papers_table() {
+    let folder = Folder::with(&["three_fins.obj"]);
+    folder.write_mesh("hill.ply", &hill(60));
+    let json = |arguments: &str| -> Value {
+        let ran = folder.run(&format!("structures --json {arguments}"));
+        assert_eq!(ran.status, 0, "{arguments}: {}", ran.stderr);
+        serde_json::from_slice(&ran.stdout).unwrap()
+    };
+    let hill = json("hill.ply");
+    for (key, value) in [
+        ("face", Value::from("triangle")),
+        ("faces", 7200.into()),
+        ("vertices", 3721.into()),
+        ("boundary_edges", 240.into()),
+        ("non_manifold_edges", 0.into()),
+    ] {
+        assert_eq!(hill[key], value, "{key}");
+    }
+    let rows = hill["structures"].as_array().unwrap();
+    for (row, (name, of_triangle, of_vertex)) in rows.iter().zip([
+        ("individual triangles", Some(36), Some(72)),
+        ("shared vertex", Some(18), Some(36)),
+        ("shared vertex with neighbours", Some(32), Some(64)),
+        ("winged-edge", Some(60), Some(120)),
+        ("quad-edge", None, None),
+        ("half-edge, all references", None, Some(144)),
+        ("half-edge, paired opposites", None, Some(96)),
+        ("full directed-edge", Some(68), None),
+        ("medium directed-edge", Some(44), None),
+        ("small directed-edge", Some(32), Some(64)),
+    ]) {
+        assert_eq!(row["structure"], name);
+        assert_eq!(row["bytes_per_triangle_stated"], Value::from(of_triangle));
+        assert_eq!(row["bytes_per_vertex_stated"], Value::from(of_vertex));
+        let (found, limit) = (
+            &row["bytes_per_triangle"],
+            &row["bytes_per_triangle_formula"],
+        );
+        let ratio = found.as_f64().unwrap() / limit.as_f64().unwrap();
+        // A boundary of 240 edges has more vertices and edges to a triangle.
+        assert!((1.0..1.04).contains(&ratio), "{name}: {ratio}");
+        assert!(row["construct_ns_per_triangle"].as_f64().unwrap() > 0.0);
+        assert!((0.0..1.0).contains(&row["redundancy_share"].as_f64().unwrap()));
+        let queries = row["queries"].as_object().unwrap();
+        assert_eq!(queries.len(), 8);
+        assert!(
+            queries.values().all(|q| q["ns"].as_f64().unwrap() > 0.0),
+            "{name}"
+        );
+        let is_searched = row["neighbourhood"] == "-";
+        assert_eq!(
+            queries["vertex_faces"]["cost"] == "search",
+            is_searched,
+            "{name}"
+        );
+        assert_eq!(row["edge_flip_ns"].is_null(), is_searched, "{name}");
+    }
+    assert_eq!(rows.len(), 10);
+
+    let fins = json("three_fins.obj");
+    for row in fins["structures"].as_array().unwrap() {
+        let carries = row["carries_non_manifold"] == true;
+        assert_eq!(row["cannot_carry"].is_null(), carries, "{row}");
+        assert_eq!(row["bytes"].is_null(), !carries, "{row}");
+    }
+}
+
+/// A file of quads is measured as such, whatever its format; one triangle more, and it is not.
+#[test]
+fn structures_takes_quads_as_they_are() {
+    let folder = Folder::with(&["cube_quads.obj"]);
+    let corners = "0 0 0\n1 0 0\n2 0 0\n0 1 0\n1 1 0\n2 1 0\n";
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 2\nproperty list uchar int vertex_indices\nend_header\n{corners}4 0 1 4 3\n4 1 2 5 4\n"
+    );
+    folder.write("two.ply", &ply);
+    folder.write(
+        "two.off",
+        &format!("OFF 6 2 0\n{corners}4 0 1 4 3\n4 1 2 5 4\n"),
+    );
+    folder.write(
+        "mixed.off",
+        &format!("OFF 6 2 0\n{corners}4 0 1 4 3\n3 1 2 5\n"),
+    );
+    for (mesh, face, faces, edges, boundary) in [
+        ("cube_quads.obj", "quad", 6, 12, 0),
+        ("two.ply", "quad", 2, 7, 6),
+        ("two.off", "quad", 2, 7, 6),
+        ("mixed.off", "triangle", 3, 8, 7),
+    ] {
+        let ran = folder.run(&format!("structures {mesh} --json"));
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        let measured: Value = serde_json::from_slice(&ran.stdout).unwrap();
+        assert_eq!(measured["face"], face, "{mesh}");
+        for (key, value) in [
+            ("faces", faces),
+            ("edges", edges),
+            ("boundary_edges", boundary),
+        ] {
+            assert_eq!(measured[key], value, "{mesh}: {key}");
+        }
+        if face == "quad" {
+            let row = &measured["structures"][0];
+            assert_eq!(row["bytes_per_quad_formula"], 48.0, "{mesh}");
+            let bytes = 16 * measured["vertices"].as_u64().unwrap() + 32 * faces as u64;
+            assert_eq!(row["bytes"], bytes, "{mesh}");
+            assert!(row["construct_ns_per_quad"].as_f64().unwrap() > 0.0);
+        }
+    }
+    let ran = folder.run("structures cube_quads.obj");
+    let text = String::from_utf8(ran.stdout).unwrap();
+    assert!(
+        text.starts_with("6 quads, 8 vertices, 12 edges (0 boundary, 0 non-manifold)\n"),
+        "{text}"
+    );
+}
+
+/// The tables for people have a row a structure, and say why one is empty.
+#[test]
+fn structures_is_a_table_too() {
+    let folder = Folder::with(&["three_fins.obj", "tetrahedron.off"]);
+    let text = |mesh: &str| {
+        let ran = folder.run(&format!("structures {mesh}"));
+        assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+        String::from_utf8(ran.stdout).unwrap()
+    };
+    let fins = text("three_fins.obj");
+    for name in [
+        "individual triangles ",
+        "winged-edge ",
+        "small directed-edge ",
+    ] {
+        assert_eq!(
+            fins.lines().filter(|line| line.starts_with(name)).count(),
+            2 + usize::from(name == "winged-edge "),
+            "{fins}"
+        );
+    }
+    let why = "winged-edge cannot carry it: the edge between vertices 0 and 1 has 3 faces, one or two fit";
+    assert!(fins.contains(why), "{fins}");
+    // 16 bytes a vertex and 24 a face: 40 a face where there are as many.
+    let tetrahedron = text("tetrahedron.off");
+    let row = tetrahedron
+        .lines()
+        .find(|line| line.starts_with("small directed-edge"));
+    let cells: Vec<&str> = row.unwrap().split_whitespace().collect();
+    assert_eq!(
+        cells[2..],
+        [
+            "40.0", "32.0", "32", "40.0", "64.0", "64", "40", "%", "yes", "M", "M,C", "C", "C"
+        ]
+    );
+    assert!(!tetrahedron.contains("cannot"), "{tetrahedron}");
+    folder
+        .run("structures missing.ply")
+        .failed(1, "missing.ply");
+}
+
 /// Every invariant after every collapse, in each tier; and checking changes nothing.
 #[test]
 fn check_passes() {
@@ -1141,6 +1303,7 @@ fn help_says_what_ratio_and_max_error_mean() {
         "in model units",
         "3 stopped short under --strict",
         "decimate info MESH",
+        "decimate structures MESH",
     ] {
         assert!(help.contains(phrase), "no {phrase:?} in {help}");
     }

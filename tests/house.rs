@@ -10,7 +10,7 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 11] = [
     ("error", &[]),
     ("indexed_mesh", &["error"]),
     ("mesh", &[]),
@@ -37,17 +37,19 @@ const ARROWS: [(&str, &[&str]); 10] = [
         "repair",
         &["error", "indexed_mesh", "clean", "mesh", "metrics"],
     ),
+    ("structures", &["error", "indexed_mesh", "clean", "mesh"]),
 ];
 
 /// The files of the command, outside of the library.
 const COMMAND: [&str; 3] = ["main.rs", "cli.rs", "text.rs"];
 
 /// Tests and their shapes: a file here is allowed everything, and its `mod` must be `cfg(test)`.
-const TEST_FILES: [&str; 4] = [
+const TEST_FILES: [&str; 5] = [
     "shapes.rs",
     "mesh/tests.rs",
     "mesh/modify_tests.rs",
     "decimate/tests.rs",
+    "structures/tests.rs",
 ];
 
 /// A token and its line, brackets of groups among them.

@@ -103,6 +103,41 @@ fn every_mesh_has_the_counts_of_its_manifest() {
 }
 
 /// Within a second and without a panic, whatever their headers promise.
+/// Polygons that are read whole and cut afterwards are the triangles that are read at once.
+#[test]
+fn polygons_are_cut_the_same_sooner_or_later() {
+    for name in ["meshes", "malformed"] {
+        let Some(folder) = folder(name) else {
+            return;
+        };
+        for entry in folder.read_dir().unwrap() {
+            let path = entry.unwrap().path();
+            let at_once = io::read(&path, &ReadOptions::default());
+            let later = io::read_polygons(&path, &ReadOptions::default());
+            match (at_once, later.and_then(|mesh| mesh.fanned())) {
+                (Ok(at_once), Ok(later)) => {
+                    // By their bits, since not every coordinate is a number.
+                    assert_eq!(at_once.triangles(), later.triangles(), "{}", path.display());
+                    let bits = |p: &glam::Vec3| p.to_array().map(f32::to_bits);
+                    let at_once = at_once.positions().iter().map(bits);
+                    assert!(
+                        at_once.eq(later.positions().iter().map(bits)),
+                        "{}",
+                        path.display()
+                    );
+                }
+                (Err(at_once), Err(later)) => assert_eq!(at_once.to_string(), later.to_string()),
+                (at_once, later) => panic!(
+                    "{}: {:?}, {:?}",
+                    path.display(),
+                    at_once.map(|mesh| mesh.triangle_count()),
+                    later.map(|mesh| mesh.triangle_count())
+                ),
+            }
+        }
+    }
+}
+
 #[test]
 fn malformed_files_are_read_or_refused_at_once() {
     let Some(folder) = folder("malformed") else {

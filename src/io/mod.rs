@@ -28,7 +28,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use crate::error::{Error, Place, Result};
-use crate::indexed_mesh::IndexedMesh;
+use crate::indexed_mesh::{IndexedMesh, MeshBuilder, PolygonMesh};
 
 pub use output::{check_place, write_file};
 
@@ -122,6 +122,24 @@ pub struct WriteOptions {
 /// [`Error::Io`] where the file cannot be read, [`Error::Parse`] where its content is not what its
 /// format asks for, with the line or byte, or has not the weight asked for.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<IndexedMesh> {
+    let mut builder = MeshBuilder::default();
+    read_into(path, options, &mut builder)?;
+    builder.finish()
+}
+
+/// Reads a mesh as [`read`] does, its polygons left whole. Triangle strips are triangles; a vertex
+/// weight is passed over.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_polygons(path: &Path, options: &ReadOptions) -> Result<PolygonMesh> {
+    let mut builder = MeshBuilder::of_polygons();
+    read_into(path, options, &mut builder)?;
+    builder.finish_polygons()
+}
+
+/// Reads whatever the file holds into a mesh.
+fn read_into(path: &Path, options: &ReadOptions, builder: &mut MeshBuilder) -> Result<()> {
     let input = if path == Path::new("-") {
         Input::stdin()
     } else {
@@ -142,10 +160,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<IndexedMesh> {
         ));
     }
     match format {
-        Format::Ply => ply::read(input, vertex_weight),
-        Format::Obj => obj::read(input),
-        Format::Stl => stl::read(input),
-        Format::Off => off::read(input),
+        Format::Ply => ply::read(input, vertex_weight, builder),
+        Format::Obj => obj::read(input, builder),
+        Format::Stl => stl::read(input, builder),
+        Format::Off => off::read(input, builder),
     }
 }
 

@@ -5,16 +5,15 @@
 //! the report counts, and names no line in its errors. A test holds our numbers against its.
 
 use crate::error::Result;
-use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
+use crate::indexed_mesh::MeshBuilder;
 
 use super::input::Input;
 use super::text::{Lines, count, parse_integer, parse_number, quote};
 
-/// Reads an OBJ file. Groups, objects, materials, normals and texture coordinates are skipped;
+/// Reads an OBJ file into a mesh. Groups, objects, materials, normals and texture coordinates are skipped;
 /// a face of one or two corners is none.
-pub(super) fn read(input: Input) -> Result<IndexedMesh> {
+pub(super) fn read(input: Input, builder: &mut MeshBuilder) -> Result<()> {
     let mut lines = Lines::new(input)?;
-    let mut builder = MeshBuilder::default();
     let mut highest = Highest::default();
     let mut corners = Vec::new();
     let mut any = false;
@@ -42,7 +41,7 @@ pub(super) fn read(input: Input) -> Result<IndexedMesh> {
     if !any {
         return Err(lines.error_in_file("no line begins with v or f", "Wavefront OBJ"));
     }
-    builder.finish()
+    Ok(())
 }
 
 /// Three coordinates; a weight or a colour behind them is dropped.
@@ -122,6 +121,13 @@ impl Highest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::indexed_mesh::IndexedMesh;
+
+    fn read(input: Input) -> Result<IndexedMesh> {
+        let mut builder = MeshBuilder::default();
+        super::read(input, &mut builder)?;
+        builder.finish()
+    }
 
     fn mesh(text: &str) -> IndexedMesh {
         read(Input::from_bytes("a.obj", text).unwrap()).unwrap()

@@ -1,7 +1,7 @@
 //! OFF as text: a keyword, counts, vertices, faces; colours and normals behind them are skipped.
 
 use crate::error::{Error, Result};
-use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
+use crate::indexed_mesh::MeshBuilder;
 
 use super::input::Input;
 use super::text::{Lines, parse_integer, parse_number, quote, words_before_comment};
@@ -23,11 +23,10 @@ fn is_keyword(word: &[u8]) -> bool {
         .any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
 }
 
-/// Reads an OFF file. A face of one or two corners is none.
-pub(super) fn read(input: Input) -> Result<IndexedMesh> {
+/// Reads an OFF file into a mesh. A face of one or two corners is none.
+pub(super) fn read(input: Input, builder: &mut MeshBuilder) -> Result<()> {
     let mut lines = Lines::new(input)?;
     let [vertices, faces] = read_counts(&mut lines)?;
-    let mut builder = MeshBuilder::default();
     for i in 0..vertices {
         if !advance(&mut lines)? {
             return Err(missing(&lines, i, vertices, "vertices"));
@@ -42,7 +41,7 @@ pub(super) fn read(input: Input) -> Result<IndexedMesh> {
         parse_face(&lines, vertices, &mut corners)?;
         builder.push_polygon(&corners);
     }
-    builder.finish()
+    Ok(())
 }
 
 /// Goes to the next line that says something.
@@ -119,9 +118,12 @@ fn parse_face(lines: &Lines, vertices: u64, corners: &mut Vec<u32>) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::indexed_mesh::IndexedMesh;
 
     fn mesh(text: &str) -> IndexedMesh {
-        read(Input::from_bytes("a.off", text).unwrap()).unwrap()
+        let mut builder = MeshBuilder::default();
+        read(Input::from_bytes("a.off", text).unwrap(), &mut builder).unwrap();
+        builder.finish().unwrap()
     }
 
     const BODY: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n";

@@ -7,7 +7,7 @@ use ply_rs_bw::parser::{ParseError, Parser};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
 
 use crate::error::{Error, Place, Result};
-use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
+use crate::indexed_mesh::MeshBuilder;
 
 use super::blocks::Blocks;
 use super::input::Input;
@@ -15,10 +15,14 @@ use super::ply_binary::{Decoder, Plain};
 use super::ply_header::{self, AXES, CORNERS, Role, WEIGHT};
 use super::text::{Lines, parse_number, quote, words};
 
-/// Reads a PLY file: vertices, faces, triangle strips, and the vertex property that is asked for as
+/// Reads a PLY file into a mesh: vertices, faces, triangle strips, and the vertex property that is asked for as
 /// weight. Other elements and properties are skipped.
-pub(super) fn read(input: Input, vertex_weight: Option<&str>) -> Result<IndexedMesh> {
-    read_with(input, vertex_weight, Plain::of)
+pub(super) fn read(
+    input: Input,
+    vertex_weight: Option<&str>,
+    builder: &mut MeshBuilder,
+) -> Result<()> {
+    read_with(input, vertex_weight, Plain::of, builder)
 }
 
 /// Reads a PLY file in which `plain` finds the layouts of binary elements that are plain.
@@ -26,11 +30,11 @@ pub(super) fn read_with(
     mut input: Input,
     vertex_weight: Option<&str>,
     plain: impl Fn(&ElementDef, Option<&str>) -> Option<Plain>,
-) -> Result<IndexedMesh> {
+    builder: &mut MeshBuilder,
+) -> Result<()> {
     let header = ply_header::read(&mut input, vertex_weight)?;
     let mut sink = Sink {
-        builder: MeshBuilder::default(),
-        weights: Vec::new(),
+        builder,
         vertices: header.vertices(),
     };
     let body = match header.encoding {
@@ -65,21 +69,20 @@ pub(super) fn read_with(
             reader.read_all(def, &mut sink, vertex_weight)?;
         }
     }
-    sink.builder.finish()?.with_weights(sink.weights)
+    Ok(())
 }
 
 /// The mesh while it is read.
-pub(super) struct Sink {
-    pub builder: MeshBuilder,
-    weights: Vec<f32>,
+pub(super) struct Sink<'a> {
+    pub builder: &'a mut MeshBuilder,
     /// How many the header promises.
     pub vertices: usize,
 }
 
-impl Sink {
+impl Sink<'_> {
     /// Takes the weight of the next vertex, or returns it where it is none.
     pub fn push_weight(&mut self, weight: f64) -> std::result::Result<(), f64> {
-        self.weights.push(single(weight).ok_or(weight)?);
+        self.builder.push_weight(single(weight).ok_or(weight)?);
         Ok(())
     }
 
@@ -301,7 +304,7 @@ impl ElementReader {
                         _ => sink.corner(v),
                     };
                     element.corners(&mut corners, corner).map_err(fault)?;
-                    push_strips(&mut sink.builder, &corners);
+                    push_strips(sink.builder, &corners);
                 }
                 Role::Other => {}
             }
@@ -408,6 +411,13 @@ fn binary_error(blocks: &Blocks, start: u64, def: &ElementDef, i: usize, e: &Par
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::indexed_mesh::IndexedMesh;
+
+    fn read(input: Input, vertex_weight: Option<&str>) -> Result<IndexedMesh> {
+        let mut builder = MeshBuilder::default();
+        super::read(input, vertex_weight, &mut builder)?;
+        builder.finish()
+    }
 
     fn read_bytes(bytes: impl Into<Vec<u8>>) -> Result<IndexedMesh> {
         read(Input::from_bytes("a.ply", bytes)?, None)

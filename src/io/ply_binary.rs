@@ -104,13 +104,13 @@ impl Number {
 }
 
 /// Takes the elements of one definition from the file into the mesh.
-pub(super) struct Decoder<'a> {
+pub(super) struct Decoder<'a, 'b> {
     pub def: &'a ElementDef,
     pub blocks: &'a mut Blocks,
-    pub sink: &'a mut Sink,
+    pub sink: &'a mut Sink<'b>,
 }
 
-impl Decoder<'_> {
+impl Decoder<'_, '_> {
     /// Reads all of them, whose numbers have their highest byte first if `BIG`.
     ///
     /// # Errors
@@ -354,8 +354,20 @@ fn integer<const BIG: bool>(scalar: &ScalarType, bytes: &[u8]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::super::input::Input;
-    use super::super::ply::read_with;
+    use super::super::ply;
     use super::*;
+    use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
+
+    /// The mesh in a file in which `plain` finds the plain layouts.
+    fn read_with(
+        input: Input,
+        weight: Option<&str>,
+        plain: impl Fn(&ElementDef, Option<&str>) -> Option<Plain>,
+    ) -> Result<IndexedMesh> {
+        let mut builder = MeshBuilder::default();
+        ply::read_with(input, weight, plain, &mut builder)?;
+        builder.finish()
+    }
 
     const TYPES: [&str; 8] = [
         "char", "uchar", "short", "ushort", "int", "uint", "float", "double",
@@ -564,7 +576,7 @@ mod tests {
     }
 
     /// A mesh or a message, with every bit of it that matters.
-    fn shown(result: Result<crate::indexed_mesh::IndexedMesh>) -> String {
+    fn shown(result: Result<IndexedMesh>) -> String {
         match result {
             Ok(mesh) => format!("{mesh:?}"),
             Err(error) => error.to_string(),

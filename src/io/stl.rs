@@ -1,7 +1,7 @@
 //! STL, binary and ASCII: facets with three vertices of their own each.
 
 use crate::error::{Error, Place, Result};
-use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
+use crate::indexed_mesh::MeshBuilder;
 
 use super::blocks::Blocks;
 use super::input::Input;
@@ -38,22 +38,22 @@ fn binary_bytes(facets: u32) -> u64 {
     HEADER_BYTES as u64 + FACET_BYTES as u64 * u64::from(facets)
 }
 
-/// Reads an STL file. Welding its vertices is a later stage's work.
-pub(super) fn read(input: Input) -> Result<IndexedMesh> {
+/// Reads an STL file into a mesh. Welding its vertices is a later stage's work.
+pub(super) fn read(input: Input, builder: &mut MeshBuilder) -> Result<()> {
     // UTF-16 has zero bytes, so it is told by its mark alone.
     let utf16 = matches!(input.head.as_slice(), [0xFE, 0xFF, ..] | [0xFF, 0xFE, ..]);
     let first = words(&input.head).next().unwrap_or_default();
     let solid = first.eq_ignore_ascii_case(b"solid") && !input.head.contains(&0);
     if is_binary_by_length(&input.head, input.length) {
-        read_binary(input)
+        read_binary(input, builder)
     } else if is_ascii(&input.head) || solid || utf16 {
-        read_ascii(input)
+        read_ascii(input, builder)
     } else {
-        read_binary(input)
+        read_binary(input, builder)
     }
 }
 
-fn read_binary(input: Input) -> Result<IndexedMesh> {
+fn read_binary(input: Input, builder: &mut MeshBuilder) -> Result<()> {
     let Some(promised) = promised_facets(&input.head) else {
         let found = format!("{} bytes and no word 'solid'", input.head.len());
         return Err(input.error(
@@ -82,15 +82,14 @@ fn read_binary(input: Input) -> Result<IndexedMesh> {
     blocks.peek(HEADER_BYTES)?;
     blocks.consume(HEADER_BYTES);
     let promised_facets = promised as usize;
-    let mut builder = MeshBuilder::default();
     if known {
         builder.reserve_vertices(promised_facets.saturating_mul(3));
         builder.reserve_triangles(promised_facets);
     }
-    while builder.triangle_count() < promised_facets {
+    while builder.face_count() < promised_facets {
         let block = blocks.peek(FACET_BYTES)?;
         let facets = block.as_chunks::<FACET_BYTES>().0;
-        let first = builder.triangle_count();
+        let first = builder.face_count();
         let facets = &facets[..facets.len().min(promised_facets - first)];
         if facets.is_empty() {
             let rest = block.len() as u64;
@@ -108,7 +107,7 @@ fn read_binary(input: Input) -> Result<IndexedMesh> {
         let length = binary_bytes(promised);
         return Err(wrong_length(blocks.input(), length, " and more"));
     }
-    builder.finish()
+    Ok(())
 }
 
 fn facet_vertices(facet: &[u8; FACET_BYTES]) -> [[f32; 3]; 3] {
@@ -123,9 +122,8 @@ fn push_facet(builder: &mut MeshBuilder, vertices: [[f64; 3]; 3]) {
 
 /// Reads ASCII STL by words, so that line breaks do not matter; `solid` and `endsolid` take the
 /// rest of their line as a name, and words that say nothing are skipped.
-fn read_ascii(input: Input) -> Result<IndexedMesh> {
+fn read_ascii(input: Input, builder: &mut MeshBuilder) -> Result<()> {
     let mut lines = Lines::new(input)?;
-    let mut builder = MeshBuilder::default();
     let mut facet: Option<Facet> = None;
     while lines.advance()? {
         for word in words(lines.line()) {
@@ -153,7 +151,7 @@ fn read_ascii(input: Input) -> Result<IndexedMesh> {
                     }
                 },
                 Keyword::EndFacet => match facet.take() {
-                    Some(facet) => push_facet(&mut builder, facet.vertices(&lines)?),
+                    Some(facet) => push_facet(builder, facet.vertices(&lines)?),
                     None => return Err(lines.error("endfacet without facet", "facet before it")),
                 },
                 Keyword::Solid => {
@@ -168,7 +166,7 @@ fn read_ascii(input: Input) -> Result<IndexedMesh> {
     }
     match facet {
         Some(facet) => Err(facet.unfinished(&lines)),
-        None => builder.finish(),
+        None => Ok(()),
     }
 }
 
@@ -237,9 +235,16 @@ impl Facet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::indexed_mesh::IndexedMesh;
 
     const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
                          vertex 0 1 0\nendloop\nendfacet\n";
+
+    fn read(input: Input) -> Result<IndexedMesh> {
+        let mut builder = MeshBuilder::default();
+        super::read(input, &mut builder)?;
+        builder.finish()
+    }
 
     fn mesh(text: impl Into<Vec<u8>>) -> IndexedMesh {
         read(Input::from_bytes("a.stl", text).unwrap()).unwrap()

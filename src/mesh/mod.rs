@@ -64,8 +64,8 @@ pub use ring::{BoundaryCurve, Fan};
 pub use store::{EdgeStore, Full, Medium, Small, Tier};
 pub use vertex_split::VertexSplit;
 
-use link::{OppositeWord, OutgoingWord};
-use non_manifold::SideTable;
+pub(crate) use link::{OppositeWord, OutgoingWord};
+pub(crate) use non_manifold::SideTable;
 use smallvec::SmallVec;
 
 /// A triangle mesh's connectivity in one memory tier.
