@@ -19,10 +19,15 @@ use decimate::metrics::{CompareOptions, Reference, info, info_of_file};
 use decimate::repair;
 use decimate::structures::measure_polygons;
 use indicatif::{ProgressBar, ProgressStyle};
+use peak_alloc::PeakAlloc;
 use serde::Serialize;
 
 use cli::{Cli, Command, CompareArgs, InfoArgs, RepairArgs, Run, StructuresArgs};
 use text::Compared;
+
+/// Counts what is allocated, for the report.
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
 
 /// Exit status of a run that stopped short under `--strict`.
 const STOPPED_SHORT: u8 = 3;
@@ -83,6 +88,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     io::write(output, &mesh, &write_options)?;
     report.read_seconds = read_seconds;
     report.write_seconds = start.elapsed().as_secs_f64();
+    report.peak_heap_bytes = Some(HEAP.peak_usage() as u64);
     report.peak_rss_bytes = peak_rss_bytes();
     if let Some(path) = &args.report {
         write_json(path, &report)?;

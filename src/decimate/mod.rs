@@ -113,6 +113,7 @@ pub fn decimate_with_progress(
         build_seconds: 0.0,
         decimate_seconds: 0.0,
         write_seconds: 0.0,
+        peak_heap_bytes: None,
         peak_rss_bytes: None,
     };
     let is_fast = options.quality == Quality::Fast;

@@ -137,6 +137,8 @@ pub struct Report {
     pub decimate_seconds: f64,
     /// Seconds to write the file; filled in by whoever wrote it.
     pub write_seconds: f64,
+    /// The most bytes that were allocated at once; filled in by whoever counts allocations.
+    pub peak_heap_bytes: Option<u64>,
     /// The most memory that the process held at once; filled in by whoever can ask the system.
     pub peak_rss_bytes: Option<u64>,
 }
