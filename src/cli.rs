@@ -298,7 +298,7 @@ pub enum PlacementArg {
 /// `--tier`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub enum TierArg {
-    /// The largest that fits the memory limit
+    /// The fastest by measurement of those that fit the memory limit
     #[default]
     Auto,
     /// 68 bytes per triangle

@@ -82,7 +82,7 @@ pub enum Chunks {
 /// Which memory tier to decimate in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TierChoice {
-    /// The largest that fits the memory limit.
+    /// The fastest by measurement of those that fit the memory limit.
     #[default]
     Auto,
     /// This one.
