@@ -118,6 +118,22 @@ impl Memoryless {
     }
 }
 
+/// The numbers of tensors.
+#[inline(always)]
+fn numbers(tensors: [&Tensor; LANES]) -> [Lanes; 9] {
+    let ([a, b, c, d], [e, f, g, h], [.., i]) =
+        (part(tensors, 0), part(tensors, 4), part(tensors, 5));
+    [a, b, c, d, e, f, g, h, i]
+}
+
+/// Four of tensors' numbers.
+#[inline(always)]
+fn part(tensors: [&Tensor; LANES], first: usize) -> [Lanes; 4] {
+    Lanes::transpose(each(tensors, |t| {
+        Lanes::new(*t.numbers[first..].first_chunk().expect("nine numbers"))
+    }))
+}
+
 /// Where an edge's energy is least among the places that keep the volume.
 ///
 /// `dying` is the sum of the normals of the faces at the edge, nothing where the edge encloses no
@@ -233,7 +249,13 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         if any_is_heavy(at_tails) | any_is_heavy(at_heads) {
             return one_by_one();
         }
-        let [Some(a), Some(b), Some(c), Some(d)] = each(*edges, |e| apexes(surface, e)) else {
+        let [a, b, c, d] = *edges;
+        let (Some(a), Some(b), Some(c), Some(d)) = (
+            apexes(surface, a),
+            apexes(surface, b),
+            apexes(surface, c),
+            apexes(surface, d),
+        ) else {
             return one_by_one();
         };
         let apexes = [a, b, c, d];
@@ -242,14 +264,6 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         let from = places(surface, each(apexes, |[_, b]| b));
         let across = between(&from, &places(surface, each(apexes, |[a, _]| a)), scale);
         let dying = Some(cross(&along, &across));
-        let numbers = |tensors: [&Tensor; LANES]| {
-            let part = |i: usize| {
-                let four = |t: &Tensor| Lanes::new(*t.numbers[i..].first_chunk().expect("nine"));
-                Lanes::transpose(each(tensors, four))
-            };
-            let ([a, b, c, d], [e, f, g, h], [.., i]) = (part(0), part(4), part(5));
-            [a, b, c, d, e, f, g, h, i]
-        };
         let (at_v, at_w) = (numbers(at_tails), numbers(at_heads));
         let weight = if surface.weights.is_empty() {
             Lanes::splat(1.0)
