@@ -265,27 +265,26 @@ fn three_fins_come_down_to_three_triangles<S: EdgeStore>() {
     assert!(report.tally.collapses_non_manifold > 16);
 }
 
+/// The bits of the positions on the rim of the unit square, sorted.
+fn rim_of_square(positions: &[Vec3]) -> Vec<[u32; 3]> {
+    let on_rim = |p: &&Vec3| [p.x, p.y].iter().any(|&c| c == 0.0 || c == 1.0);
+    let on_rim = positions.iter().filter(on_rim);
+    let mut rim: Vec<_> = on_rim.map(|p| p.to_array().map(f32::to_bits)).collect();
+    rim.sort_unstable();
+    rim
+}
+
 /// The boundary keeps its vertices where it is locked.
 fn a_locked_boundary_keeps_its_bits<S: EdgeStore>() {
     let shape = bumpy(20);
-    let on_rim = |p: &&Vec3| p.x == 0.0 || p.x == 1.0 || p.y == 0.0 || p.y == 1.0;
-    let sorted = |positions: &[Vec3]| {
-        let mut rim: Vec<_> = positions
-            .iter()
-            .filter(on_rim)
-            .map(|p| p.to_array().map(f32::to_bits))
-            .collect();
-        rim.sort_unstable();
-        rim
-    };
-    let before = sorted(&shape.0);
+    let before = rim_of_square(&shape.0);
     assert_eq!(before.len(), 80);
     let options = Options {
         boundary: Boundary::Lock,
         ..to_triangles(100)
     };
     let (small, report) = run_in::<S>(shape, options);
-    assert_eq!(sorted(small.positions()), before);
+    assert_eq!(rim_of_square(small.positions()), before);
     assert!(report.tally.rejected_lock >= 80);
     assert!(report.triangles_out <= 100);
 }
@@ -1431,17 +1430,10 @@ mod chunked {
             let original = positions.clone();
             let (small, report) = run_in::<S>((positions, triangles), options);
             assert!(report.chunks > 2);
-            let on_rim = |p: &&Vec3| [p.x, p.y].iter().any(|&c| c == 0.0 || c == 1.0);
-            let rim = |positions: &[Vec3]| {
-                let mut rim: Vec<_> = positions
-                    .iter()
-                    .filter(on_rim)
-                    .map(|p| p.to_array().map(f32::to_bits))
-                    .collect();
-                rim.sort_unstable();
-                rim
-            };
-            assert!(rim(small.positions()) == rim(&original), "{quality:?}");
+            assert!(
+                rim_of_square(small.positions()) == rim_of_square(&original),
+                "{quality:?}"
+            );
 
             let options = Options {
                 feature_angle_degrees: Some(45.0),
