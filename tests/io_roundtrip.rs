@@ -57,6 +57,34 @@ fn awkward() -> IndexedMesh {
     IndexedMesh::new(positions, triangles).unwrap()
 }
 
+/// What a name says of a file, it says of bytes that come from elsewhere.
+#[test]
+fn bytes_are_written_and_read_as_files_are() {
+    let mesh = awkward();
+    for (name, _, ascii) in WAYS {
+        let options = WriteOptions {
+            ascii,
+            ..Default::default()
+        };
+        let mut bytes = Vec::new();
+        io::write_to(Path::new(name), &mut bytes, &mesh, &options).unwrap();
+        let length = Some(bytes.len() as u64);
+        let source = std::io::Cursor::new(bytes);
+        let back = io::read_from(Path::new(name), source, length, &ReadOptions::default());
+        assert_eq!(corner_bits(&back.unwrap()), corner_bits(&mesh), "{name}");
+    }
+    let empty = io::read_from(
+        Path::new("a.obj"),
+        std::io::empty(),
+        None,
+        &ReadOptions::default(),
+    );
+    assert_eq!(
+        empty.unwrap_err().to_string(),
+        "a.obj: the file is empty; expected a mesh"
+    );
+}
+
 #[test]
 fn every_format_keeps_every_bit() {
     let mesh = awkward();

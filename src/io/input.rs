@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place, Result};
 
+use super::text::one_line;
 use super::{Format, KNOWN_FORMATS, off, stl};
 
 /// How much is read at a time.
@@ -120,8 +121,8 @@ impl Input {
         Error::Parse {
             file: self.file.clone(),
             place,
-            found: found.to_string(),
-            expected: expected.to_string(),
+            found: one_line(found),
+            expected: one_line(expected),
         }
     }
 

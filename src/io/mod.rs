@@ -23,7 +23,7 @@ mod stl;
 mod text;
 
 use std::fmt;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -123,7 +123,27 @@ pub struct WriteOptions {
 /// format asks for, with the line or byte, or has not the weight asked for.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<IndexedMesh> {
     let mut builder = MeshBuilder::default();
-    read_into(path, options, &mut builder)?;
+    read_into(open(path)?, options, &mut builder)?;
+    builder.finish()
+}
+
+/// Reads a mesh as [`read`] does, from any source of bytes: `name` stands for its path, in messages
+/// and where an extension tells the format.
+///
+/// `length` is how many bytes the source has, where that is known: it bounds what a header makes
+/// room for, and tells a binary STL. A wrong one is found out as a wrong header is.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(
+    name: &Path,
+    source: impl Read + 'static,
+    length: Option<u64>,
+    options: &ReadOptions,
+) -> Result<IndexedMesh> {
+    let mut builder = MeshBuilder::default();
+    let input = Input::new(name.to_path_buf(), Box::new(source), length)?;
+    read_into(input, options, &mut builder)?;
     builder.finish()
 }
 
@@ -134,17 +154,21 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<IndexedMesh> {
 /// As [`read`].
 pub fn read_polygons(path: &Path, options: &ReadOptions) -> Result<PolygonMesh> {
     let mut builder = MeshBuilder::of_polygons();
-    read_into(path, options, &mut builder)?;
+    read_into(open(path)?, options, &mut builder)?;
     builder.finish_polygons()
 }
 
-/// Reads whatever the file holds into a mesh.
-fn read_into(path: &Path, options: &ReadOptions, builder: &mut MeshBuilder) -> Result<()> {
-    let input = if path == Path::new("-") {
+/// The file at `path`, or standard input.
+fn open(path: &Path) -> Result<Input> {
+    if path == Path::new("-") {
         Input::stdin()
     } else {
         Input::open(path)
-    }?;
+    }
+}
+
+/// Reads whatever the file holds into a mesh.
+fn read_into(input: Input, options: &ReadOptions, builder: &mut MeshBuilder) -> Result<()> {
     input.refuse_stand_ins()?;
     let format = match options.format {
         Some(format) => format,
@@ -179,7 +203,26 @@ fn read_into(path: &Path, options: &ReadOptions, builder: &mut MeshBuilder) -> R
 pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<()> {
     let format = output_format(path, options)?;
     output::write_file(path, |mut writer| {
-        write_to(&mut writer, mesh, format, options)
+        write_as(&mut writer, mesh, format, options)
+    })
+}
+
+/// Writes a mesh as [`write()`] does, to any writer: `name` stands for its path, in messages and
+/// where an extension tells the format.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_to(
+    name: &Path,
+    writer: &mut dyn Write,
+    mesh: &IndexedMesh,
+    options: &WriteOptions,
+) -> Result<()> {
+    let format = output_format(name, options)?;
+    write_as(writer, mesh, format, options).map_err(|source| Error::Io {
+        path: name.to_path_buf(),
+        action: "cannot write",
+        source,
     })
 }
 
@@ -216,7 +259,7 @@ pub fn output_format(path: &Path, options: &WriteOptions) -> Result<Format> {
 }
 
 /// Writes a mesh in `format`.
-fn write_to(
+fn write_as(
     writer: &mut dyn Write,
     mesh: &IndexedMesh,
     format: Format,

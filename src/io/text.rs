@@ -8,6 +8,8 @@ use super::input::Input;
 
 /// The longest piece of a file that a message repeats, in characters.
 const QUOTE_CHARS: usize = 40;
+/// How much either half of a message says: room for the properties of a vertex that has sixty.
+const MESSAGE_CHARS: usize = 1000;
 
 /// The lines of a text file, one at a time in one buffer.
 ///
@@ -202,19 +204,26 @@ pub(super) fn words_before_comment(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     words(line).take_while(|word| word[0] != b'#')
 }
 
-/// A piece of a file as a message repeats it: in quotes, shortened, on one line.
+/// What a message says, on one line whatever names of the file stand in it, and no longer than
+/// anyone reads.
+pub(super) fn one_line(text: &str) -> String {
+    let clean = |c: char| if c.is_control() { ' ' } else { c };
+    let mut line: String = text.chars().map(clean).take(MESSAGE_CHARS).collect();
+    if text.chars().nth(MESSAGE_CHARS).is_some() {
+        line.push('…');
+    }
+    line
+}
+
+/// A piece of a file as a message repeats it: in quotes, shortened.
 pub(super) fn quote(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * QUOTE_CHARS)]);
-    let clean: String = text
-        .trim()
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .take(QUOTE_CHARS)
-        .collect();
-    if clean.len() < text.trim().len() {
-        format!("'{clean}…'")
+    let text = text.trim();
+    let start: String = text.chars().take(QUOTE_CHARS).collect();
+    if start.len() < text.len() {
+        format!("'{start}…'")
     } else {
-        format!("'{clean}'")
+        format!("'{start}'")
     }
 }
 
@@ -372,6 +381,15 @@ mod tests {
         let expected = [(1, "v 1".to_string()), (2, "?".to_string())];
         assert_eq!(lines([vec![0xFE, 0xFF], big].concat()), expected);
         assert_eq!(lines([vec![0xFF, 0xFE], little].concat()), expected);
+    }
+
+    /// A name from a file's header may hold what moves a terminal's cursor, and be as long as it likes.
+    #[test]
+    fn a_message_is_one_line_of_bounded_length() {
+        assert_eq!(one_line("a\x1b[2J\0\u{85}b"), "a [2J  b");
+        let long = "ö".repeat(MESSAGE_CHARS);
+        assert_eq!(one_line(&long), long);
+        assert_eq!(one_line(&format!("{long}ö")), format!("{long}…"));
     }
 
     #[test]
