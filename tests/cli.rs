@@ -335,7 +335,9 @@ fn an_output_that_cannot_be_is_refused_before_the_work() {
         "missing.ply -o absent/out.ply --ratio 0.5",
         "missing.ply -o out.ply --ratio 0.5 --report absent/r.json",
     ] {
-        folder.run(arguments).failed(1, "cannot create");
+        let ran = folder.run(arguments);
+        ran.failed(1, "cannot create");
+        assert!(!ran.stderr.contains(".decimate-"), "{}", ran.stderr);
     }
 }
 

@@ -135,11 +135,7 @@ impl Beside {
         let created = builder.tempfile_in(directory);
         // Without the temporary name, which says nothing to the reader of a message.
         let (file, path) = created
-            .map_err(|error| {
-                error
-                    .raw_os_error()
-                    .map_or(error, io::Error::from_raw_os_error)
-            })?
+            .map_err(|error| io::Error::from(error.kind()))?
             .into_parts();
         let name = path.to_path_buf();
         unfinished.push(path);
