@@ -10,6 +10,7 @@ use crate::spatial::Grid;
 
 /// What cleaning found and did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Cleaning {
     /// Vertices merged into an earlier one at the same position (as numbers: −0 is 0).
     pub welded_vertices: usize,

@@ -23,7 +23,7 @@ use decimate::mesh::Tier;
                       decimate repair INPUT -o OUTPUT --cut [OPTIONS]\n       \
                       decimate structures MESH [--json]",
     after_help = "Exit status: 0 done (also when stopped short, which is said), 1 a file or mesh could not be \
-                  processed, 2 wrong usage, 3 stopped short under --strict.\n\n\
+                  processed, 2 wrong usage, 3 stopped short under --strict, 130 interrupted (no half file is left).\n\n\
                   Examples:\n  \
                   decimate bunny.obj -o small.ply --ratio 0.1\n  \
                   decimate scan.ply -o small.ply --triangles 50000 --tier small\n  \

@@ -54,13 +54,18 @@ impl IndexedMesh {
     /// A mesh whose positions are relative to `origin`.
     ///
     /// # Errors
-    /// As [`IndexedMesh::new`].
+    /// As [`IndexedMesh::new`], and where the origin is not finite.
     pub fn with_origin(
         origin: DVec3,
         positions: Vec<Vec3>,
         triangles: Vec<[u32; 3]>,
     ) -> Result<Self> {
         check_sizes(positions.len(), triangles.len())?;
+        if !origin.is_finite() {
+            return Err(Error::InvalidMesh(format!(
+                "the origin {origin} is not finite"
+            )));
+        }
         let n = positions.len();
         let outside = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= n);
         if let Some(i) = triangles.iter().position(outside) {
@@ -554,6 +559,32 @@ fn origin_for(points: &[DVec3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// 2³¹−1 directed edges are three times as many as the most triangles, and one over: a triangle
+    /// more is refused in words, before anything is counted in 32 bits.
+    #[test]
+    fn more_than_31_bits_can_number_is_an_error() {
+        assert!(check_sizes(MAX_VERTICES, MAX_TRIANGLES).is_ok());
+        let error = check_sizes(3, MAX_TRIANGLES + 1).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "715827883 triangles have more than 2^31-1 directed edges; at most 715827882 fit"
+        );
+        let error = check_sizes(MAX_VERTICES + 1, 0).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "2147483648 vertices; at most 2147483647 can be numbered"
+        );
+        assert!(check_sizes(usize::MAX, usize::MAX).is_err());
+    }
+
+    #[test]
+    fn an_origin_that_is_not_finite_is_an_error() {
+        for x in [f64::NAN, f64::INFINITY] {
+            let error = IndexedMesh::with_origin(DVec3::splat(x), vec![], vec![]);
+            assert!(error.unwrap_err().to_string().contains("not finite"));
+        }
+    }
 
     /// Left whole, polygons are what came, those of less than three corners left out; cut later, they
     /// are the triangles that they would have been at once.

@@ -25,7 +25,9 @@
 //!
 //! # Limits
 //! At most 2³¹−1 directed edges (715 million triangles) and 2³¹−1 vertices. Coordinates are single
-//! precision, relative to one double-precision origin.
+//! precision, relative to one double-precision origin. More is an [`error::Error`] where the mesh is
+//! made; a memory limit is held against what decimation will need before it begins. Nothing here
+//! prints or exits, and what the functions of [`mesh`] ask of their arguments is said at each.
 
 pub mod clean;
 pub mod decimate;

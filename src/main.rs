@@ -32,6 +32,9 @@ static HEAP: PeakAlloc = PeakAlloc;
 /// Exit status of a run that stopped short under `--strict`.
 const STOPPED_SHORT: u8 = 3;
 
+/// Exit status after Ctrl-C, as shells have it: 128 and the signal's number.
+const INTERRUPTED: i32 = 130;
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match &cli.command {
@@ -57,6 +60,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
         unreachable!("the command line requires both");
     };
     use_threads(args.threads)?;
+    leave_nothing_half_written();
     check_report(args.report.as_deref(), input, output)?;
     let options = args.options();
     options.check()?;
@@ -132,6 +136,7 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
             "nothing to repair is named; --cut is expected".into(),
         ));
     }
+    leave_nothing_half_written();
     let (input, output) = (&args.input, &args.output);
     check_report(args.report.as_deref(), input, output)?;
     let write_options = WriteOptions {
@@ -227,6 +232,18 @@ fn show_structures(args: &StructuresArgs) -> Result<ExitCode, Error> {
         })?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// From here on an interrupt (Ctrl-C, or the system's request to end) ends the command at once,
+/// whatever it is doing, and deletes what is half written.
+fn leave_nothing_half_written() {
+    // Where the caller has one of these signals ignored, as nohup does, all stay as they are.
+    let _ = ctrlc::try_set_handler(|| {
+        // Held until the end, so that no other file is begun.
+        let _abandoned = io::abandon_unfinished();
+        eprintln!("error: interrupted");
+        std::process::exit(INTERRUPTED);
+    });
 }
 
 /// Sets the number of threads; more than eight a processor would only cost their stacks.

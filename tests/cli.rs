@@ -335,7 +335,9 @@ fn an_output_that_cannot_be_is_refused_before_the_work() {
         "missing.ply -o absent/out.ply --ratio 0.5",
         "missing.ply -o out.ply --ratio 0.5 --report absent/r.json",
     ] {
-        folder.run(arguments).failed(1, "cannot create");
+        let ran = folder.run(arguments);
+        ran.failed(1, "cannot create");
+        assert!(!ran.stderr.contains(".decimate-"), "{}", ran.stderr);
     }
 }
 
@@ -731,6 +733,170 @@ fn a_full_disk_is_an_error() {
     folder
         .run("hill.ply -o /dev/full --output-format ply --ratio 0.5")
         .failed(1, "/dev/full: cannot write");
+}
+
+/// The same for the report, and for what goes through standard output.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error_of_every_output() {
+    let folder = Folder::with_hill();
+    folder
+        .run("hill.ply -o out.ply --ratio 0.5 --report /dev/full")
+        .failed(1, "/dev/full: cannot write");
+    folder
+        .run("repair hill.ply -o /dev/full --output-format obj --cut")
+        .failed(1, "/dev/full: cannot write");
+    for arguments in [
+        "hill.ply -o - --output-format ply --ratio 0.5",
+        "info hill.ply",
+        "info hill.ply --json",
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full");
+        let output = Command::new(env!("CARGO_BIN_EXE_decimate"))
+            .args(arguments.split(' '))
+            .current_dir(folder.0.path())
+            .stdout(full.unwrap())
+            .output();
+        Ran::new(output.unwrap()).failed(1, "<stdout>: cannot write");
+    }
+}
+
+/// A file that may not grow to its whole length, as on a disk that fills up: an error that names it,
+/// and nothing is left beside what was there. `ulimit` counts blocks of 512 bytes, or of 1024.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_fills_up_leaves_what_was_there() {
+    let folder = Folder::with_hill();
+    folder.write("out.ply", "old");
+    let before = folder.names();
+    for output in ["out.ply", "new.ply", "new.obj"] {
+        let limited = format!(
+            "trap '' XFSZ; ulimit -f 2; exec '{}' hill.ply -o {output} --ratio 0.9",
+            env!("CARGO_BIN_EXE_decimate")
+        );
+        let ran = Command::new("sh")
+            .args(["-c", &limited])
+            .current_dir(folder.0.path())
+            .output();
+        Ran::new(ran.unwrap()).failed(1, &format!("{output}: cannot write"));
+        assert_eq!(folder.text("out.ply"), "old", "{output}");
+        assert_eq!(folder.names(), before, "{output}");
+    }
+}
+
+/// Nothing can be created in the folder: said before the input is read, and nothing is touched. Not
+/// asked of a user who may do anything.
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder_is_refused_before_the_work() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = Folder::with(&["tetrahedron.off"]);
+    let locked = folder.0.path().join("locked");
+    fs::create_dir(&locked).unwrap();
+    fs::write(locked.join("out.ply"), "old").unwrap();
+    fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(locked.join("probe"), "").is_ok() {
+        eprintln!("skipped: this user may write to read-only folders");
+    } else {
+        for input in ["missing.off", "tetrahedron.off"] {
+            for output in ["locked/out.ply", "locked/new.ply"] {
+                folder
+                    .run(&format!("{input} -o {output} --ratio 0.5"))
+                    .failed(1, &format!("{output}: cannot create a file there"));
+            }
+        }
+        assert_eq!(folder.text("locked/out.ply"), "old");
+        assert_eq!(fs::read_dir(&locked).unwrap().count(), 1);
+    }
+    fs::set_permissions(&locked, fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+/// A reader that takes some and goes away, as `head -c` does.
+#[cfg(unix)]
+#[test]
+fn a_pipe_that_closes_in_the_middle_is_a_failure_without_a_panic() {
+    use std::io::Read;
+    let folder = Folder::with(&["sample.ply"]);
+    for arguments in [
+        "sample.ply -o - --output-format ply --ratio 1",
+        "sample.ply -o /dev/stdout --output-format obj --ratio 1",
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_decimate"))
+            .args(arguments.split(' '))
+            .current_dir(folder.0.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut first = [0; 1000];
+        let mut pipe = child.stdout.take().unwrap();
+        pipe.read_exact(&mut first).unwrap();
+        drop(pipe);
+        Ran::new(child.wait_with_output().unwrap()).failed(1, "cannot write");
+    }
+}
+
+/// Whether a child of this process hears signals: a shell has those that it runs in the background
+/// ignore Ctrl-C, and `nohup` the end of the session.
+#[cfg(target_os = "linux")]
+fn signals_are_heard() -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
+    let ignored = u64::from_str_radix(line.unwrap().trim(), 16).unwrap();
+    let bits = [1, 2, 15].map(|signal| 1 << (signal - 1));
+    bits.iter().all(|bit| ignored & bit == 0)
+}
+
+/// Ctrl-C and a request to end, before anything is written and in the middle of a file: the exit
+/// status is 130, what stood at the output's place stands there still, and nothing else does. A run
+/// that is done before the signal comes is none of these, and is tried again.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_leaves_no_half_file() {
+    use std::time::Duration;
+    if !signals_are_heard() {
+        eprintln!("skipped: signals are ignored here");
+        return;
+    }
+    let folder = Folder::with(&[]);
+    folder.write_mesh("hill.ply", &hill(400));
+    let before = BTreeSet::from(["hill.ply", "out.obj"].map(String::from));
+    let is_begun = || {
+        let is_half = |entry: fs::DirEntry| {
+            entry.file_name().to_string_lossy().starts_with(".decimate")
+                && entry.metadata().is_ok_and(|there| there.len() > 0)
+        };
+        let mut entries = fs::read_dir(folder.0.path()).unwrap();
+        entries.any(|entry| entry.is_ok_and(is_half))
+    };
+    for (signal, in_the_middle) in [("-INT", false), ("-INT", true), ("-TERM", true)] {
+        let is_interrupted = (0..20).any(|_| {
+            folder.write("out.obj", "old");
+            let mut child = Command::new(env!("CARGO_BIN_EXE_decimate"))
+                .args("hill.ply -o out.obj --ratio 0.99 --chunks off".split(' '))
+                .current_dir(folder.0.path())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            // The handler is there a moment after the start.
+            std::thread::sleep(Duration::from_millis(100));
+            while in_the_middle && !is_begun() && child.try_wait().unwrap().is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let id = child.id().to_string();
+            Command::new("kill").args([signal, &id]).status().unwrap();
+            let ran = Ran::new(child.wait_with_output().unwrap());
+            assert_eq!(folder.names(), before, "{signal}: {}", ran.stderr);
+            if ran.status == 0 {
+                assert!(folder.text("out.obj").starts_with("v "));
+                return false;
+            }
+            ran.failed(130, "interrupted");
+            assert_eq!(folder.text("out.obj"), "old");
+            true
+        });
+        assert!(is_interrupted, "{signal} came too late, twenty times");
+    }
 }
 
 #[test]

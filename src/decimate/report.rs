@@ -22,6 +22,7 @@ pub enum StopReason {
 
 /// Why the edges that are left cannot be collapsed, counted when decimation stopped short.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Blocked {
     /// The topology would change.
     pub link: usize,
@@ -35,6 +36,7 @@ pub struct Blocked {
 
 /// What the loop counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Tally {
     /// Collapses done.
     pub collapses: usize,

@@ -30,7 +30,7 @@ use std::str::FromStr;
 use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder, PolygonMesh};
 
-pub use output::{check_place, write_file};
+pub use output::{Abandoned, abandon_unfinished, check_place, write_file};
 
 use input::Input;
 
@@ -195,7 +195,8 @@ fn read_into(input: Input, options: &ReadOptions, builder: &mut MeshBuilder) -> 
 ///
 /// A file appears whole or not at all: it is written under another name beside its place and
 /// renamed when it is complete. What is there already and no regular file (a device, a pipe) is
-/// written to directly.
+/// written to directly. A program that a signal ends calls [`abandon_unfinished`] before it exits,
+/// or leaves the other name behind.
 ///
 /// # Errors
 /// [`Error::InvalidOptions`] where no format is given or named by the extension, or the precision
@@ -272,5 +273,105 @@ fn write_as(
         Format::Stl if options.ascii => output::stl_ascii(writer, mesh, options.precision),
         Format::Stl => output::stl_binary(writer, mesh),
         Format::Off => output::off(writer, mesh, options.precision),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Read};
+
+    use super::*;
+
+    /// A quad and a triangle, 6 vertices, in every format and encoding that can be told by content or
+    /// name.
+    fn files() -> Vec<(&'static str, Vec<u8>)> {
+        let positions = (0..6u8).map(|i| glam::Vec3::new(i.into(), f32::from(i * i), 0.5));
+        let triangles = vec![[0, 1, 2], [0, 2, 3], [3, 4, 5]];
+        let mesh = IndexedMesh::new(positions.collect(), triangles).unwrap();
+        let encodings = [
+            ("a.ply", false),
+            ("b.ply", true),
+            ("a.obj", false),
+            ("a.stl", false),
+            ("b.stl", true),
+            ("a.off", false),
+        ];
+        let written = encodings.map(|(name, ascii)| {
+            let options = WriteOptions {
+                ascii,
+                ..WriteOptions::default()
+            };
+            let mut bytes = Vec::new();
+            let format = output_format(name.as_ref(), &options).unwrap();
+            write_to(&mut bytes, &mesh, format, &options).unwrap();
+            (name, bytes)
+        });
+        written.into()
+    }
+
+    fn read_as(name: &str, source: Box<dyn Read>, length: u64) -> Result<IndexedMesh> {
+        let input = Input::new(name.into(), source, Some(length))?;
+        let mut builder = MeshBuilder::default();
+        read_into(input, &ReadOptions::default(), &mut builder)?;
+        builder.finish()
+    }
+
+    /// Another program writes to the file while it is read, so that it has fewer bytes or more than it
+    /// had when it was opened: the mesh that the bytes make, or an error of the file, in every format.
+    #[test]
+    fn a_file_may_grow_or_shrink_while_it_is_read() {
+        for (name, bytes) in files() {
+            let whole = bytes.len() as u64;
+            for said in [
+                0,
+                1,
+                84,
+                whole / 2,
+                whole - 1,
+                whole + 1,
+                3 * whole,
+                1 << 20,
+                u64::MAX,
+            ] {
+                let grown_or_shrunk = read_as(name, Box::new(Cursor::new(bytes.clone())), said);
+                match grown_or_shrunk {
+                    Ok(mesh) => assert_eq!(mesh.triangles().len(), 3, "{name}, {said}"),
+                    Err(Error::Parse { .. }) => {}
+                    Err(error) => panic!("{name}, {said} for {whole}: {error}"),
+                }
+            }
+            for there in 0..bytes.len() {
+                let shrunk = read_as(name, Box::new(Cursor::new(bytes[..there].to_vec())), whole);
+                let is_well = match &shrunk {
+                    Ok(mesh) => mesh.triangles().len() <= 3,
+                    Err(error) => matches!(error, Error::Parse { .. }),
+                };
+                assert!(is_well, "{name}, {there} of {whole}: {shrunk:?}");
+            }
+        }
+    }
+
+    /// A disk that fails in the middle is an error of the file, with what the system said.
+    #[test]
+    fn a_file_that_cannot_be_read_to_its_end_is_an_error() {
+        struct Broken;
+        impl Read for Broken {
+            fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+                Err(std::io::Error::other("bad sector"))
+            }
+        }
+        for (name, bytes) in files() {
+            let whole = bytes.len() as u64;
+            for there in 0..bytes.len() {
+                let source = Cursor::new(bytes[..there].to_vec()).chain(Broken);
+                let error = read_as(name, Box::new(source), whole).unwrap_err();
+                let message = error.to_string();
+                assert_eq!(
+                    message,
+                    format!("{name}: cannot read: bad sector"),
+                    "{there}"
+                );
+            }
+        }
     }
 }

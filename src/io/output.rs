@@ -3,6 +3,7 @@
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
@@ -52,17 +53,13 @@ pub fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<
         there => {
             // Through a link, so that the link stays and what it points to is replaced.
             let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-            let mut beside =
-                create_beside(&target).map_err(cannot("cannot create a file there"))?;
-            buffered(beside.as_file_mut()).map_err(cannot("cannot write"))?;
+            let beside = Beside::create(&target).map_err(cannot("cannot create a file there"))?;
+            buffered(&mut beside.file()).map_err(cannot("cannot write"))?;
             if let Ok(there) = there {
-                let same = beside.as_file().set_permissions(there.permissions());
+                let same = beside.file().set_permissions(there.permissions());
                 same.map_err(cannot("cannot set permissions"))?;
             }
-            beside
-                .persist(&target)
-                .map_err(|e| cannot("cannot replace")(e.error))?;
-            Ok(())
+            beside.take_place(&target).map_err(cannot("cannot replace"))
         }
     }
 }
@@ -85,29 +82,95 @@ pub fn check_place(path: &Path) -> Result<()> {
         Ok(there) if !there.is_file() => Ok(()),
         _ => {
             let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-            create_beside(&target).map(drop).map_err(cannot)
+            Beside::create(&target).map(drop).map_err(cannot)
         }
     }
 }
 
-/// A file beside `target`, on the same disk so that it can be renamed; gone again unless it is.
-fn create_beside(target: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
-    let directory = match target.parent() {
-        Some(parent) if parent != Path::new("") => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".decimate-");
-    // The usual permissions of a new file, from which the system takes the umask away.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let created = builder.tempfile_in(directory);
-    // Without the temporary name, which says nothing to the reader of a message.
-    created.map_err(|error| {
-        error
-            .raw_os_error()
-            .map_or(error, io::Error::from_raw_os_error)
-    })
+/// The files that are being written under names of their own.
+static UNFINISHED: Mutex<Vec<tempfile::TempPath>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<tempfile::TempPath>> {
+    // A list of paths is as good after a panic as before.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Deletes every file that this process has begun to write and not finished: for a program that was
+/// interrupted and is about to exit.
+///
+/// Until what is returned is dropped, no file is begun or finished; whoever wants to, waits.
+pub fn abandon_unfinished() -> Abandoned {
+    let mut unfinished = unfinished();
+    unfinished.clear();
+    Abandoned {
+        _unfinished: unfinished,
+    }
+}
+
+/// While it lives, no file is begun or finished; see [`abandon_unfinished`].
+#[must_use]
+pub struct Abandoned {
+    _unfinished: MutexGuard<'static, Vec<tempfile::TempPath>>,
+}
+
+/// A file beside another, on the same disk so that it can be renamed; gone again unless it is.
+struct Beside {
+    file: File,
+    /// Its name, which deletes it when it is dropped, stands among the unfinished.
+    name: PathBuf,
+}
+
+impl Beside {
+    fn create(target: &Path) -> io::Result<Beside> {
+        let directory = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent.to_path_buf(),
+            _ => PathBuf::from("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".decimate-");
+        // The usual permissions of a new file, from which the system takes the umask away.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut unfinished = unfinished();
+        let created = builder.tempfile_in(directory);
+        // Without the temporary name, which says nothing to the reader of a message.
+        let (file, path) = created
+            .map_err(|error| io::Error::from(error.kind()))?
+            .into_parts();
+        let name = path.to_path_buf();
+        unfinished.push(path);
+        Ok(Beside { file, name })
+    }
+
+    fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Takes the place of `target`.
+    fn take_place(self, target: &Path) -> io::Result<()> {
+        let mut unfinished = unfinished();
+        match self.find(&unfinished) {
+            Some(i) => unfinished
+                .swap_remove(i)
+                .persist(target)
+                .map_err(|e| e.error),
+            None => Err(io::ErrorKind::Interrupted.into()),
+        }
+    }
+
+    fn find(&self, unfinished: &[tempfile::TempPath]) -> Option<usize> {
+        let is_this = |path: &tempfile::TempPath| path.as_os_str() == self.name.as_os_str();
+        unfinished.iter().position(is_this)
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        let mut unfinished = unfinished();
+        if let Some(i) = self.find(&unfinished) {
+            drop(unfinished.swap_remove(i));
+        }
+    }
 }
 
 /// The scalar type that holds a mesh's coordinates: without an origin of its own a mesh is single

@@ -30,6 +30,7 @@ impl Default for CompareOptions {
 
 /// Distances from the points of one thing to another, in model units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Distances {
     /// The root of the mean square.
     pub rms: f64,
@@ -51,6 +52,7 @@ impl Distances {
 
 /// Distances in both directions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TwoSided {
     /// Both together: the root of the mean of both mean squares, the mean of both means, the larger
     /// of both largest (the Hausdorff distance).
@@ -153,7 +155,8 @@ impl Reference {
     /// Measures a mesh against this reference. The same bytes with any number of threads.
     ///
     /// # Errors
-    /// [`Error::InvalidMesh`] where cleaning leaves no triangle.
+    /// [`Error::InvalidMesh`] where cleaning leaves no triangle, or the mesh lies so far away that
+    /// squared distances are not finite (10¹⁵⁰).
     pub fn compare(&self, mesh: IndexedMesh, options: &CompareOptions) -> Result<Comparison> {
         let (info, surface, curves) = prepare(mesh, self.origin)?;
         let diagonal = self.info.diagonal;
@@ -203,6 +206,9 @@ pub fn compare(
     Reference::new(reference)?.compare(mesh, options)
 }
 
+/// Squares of differences of coordinates below this are finite, and their sums too.
+const TOO_FAR: f64 = 1e150;
+
 fn prepare(mesh: IndexedMesh, origin: DVec3) -> Result<(Info, Surface, Curves)> {
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangle_count());
     let (mesh, cleaning) = clean(mesh, true)?;
@@ -210,6 +216,13 @@ fn prepare(mesh: IndexedMesh, origin: DVec3) -> Result<(Info, Surface, Curves)> 
         return Err(Error::InvalidMesh("no triangle to measure".into()));
     }
     let points: Vec<DVec3> = mesh.points().map(|p| p - origin).collect();
+    let is_near = |p: &DVec3| p.abs().max_element() < TOO_FAR;
+    if let Some(far) = points.iter().position(|p| !is_near(p)) {
+        return Err(Error::InvalidMesh(format!(
+            "vertex {far} lies at {} from the reference's {origin}: squares of such distances are not finite",
+            points[far]
+        )));
+    }
     let curves = Curves::of_boundary(&points, mesh.triangles());
     let surface = Surface::new(points, mesh.triangles());
     let info = info_of_clean(mesh, vertices, triangles, cleaning);

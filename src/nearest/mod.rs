@@ -258,8 +258,8 @@ impl Triangles {
         &self.corners
     }
 
-    /// The point of the set nearest to `p`; nothing in an empty set. Of triangles equally near the
-    /// one with the smallest index.
+    /// The point of the set nearest to `p`; nothing in an empty set, or where the squared distance is
+    /// not finite. Of triangles equally near the one with the smallest index.
     pub fn nearest(&self, p: DVec3) -> Option<Nearest> {
         self.nearest_from(p, None)
     }
@@ -272,7 +272,7 @@ impl Triangles {
         }
         let around_p = self.unit.around(p);
         let mut best = Nearest::none();
-        if let Some(slot) = guess {
+        if let Some(slot) = guess.filter(|&slot| (slot as usize) < self.len()) {
             self.try_slot(p, slot, &mut best);
         }
         // Three wait at each level, and there are at most 16 levels.
@@ -312,7 +312,7 @@ impl Triangles {
                 }
             }
         }
-        Some(best)
+        best.distance_squared.is_finite().then_some(best)
     }
 
     /// What a box's squared distance must not exceed for it to hold something as near as `best`.
