@@ -303,7 +303,7 @@ mod tests {
             };
             let mut bytes = Vec::new();
             let format = output_format(name.as_ref(), &options).unwrap();
-            write_to(&mut bytes, &mesh, format, &options).unwrap();
+            write_as(&mut bytes, &mesh, format, &options).unwrap();
             (name, bytes)
         });
         written.into()
