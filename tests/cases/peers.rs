@@ -308,7 +308,7 @@ fn ball_of_rings(meridians: u32, rings: u32) -> Shape {
     positions.push(at(0.0, 1.0));
     let last = positions.len() as u32 - 1;
     let vertex = |i: u32, ring: u32| 1 + ring * meridians + i % meridians;
-    let mut triangles = squares(meridians, rings - 1, |i, ring| vertex(i, ring));
+    let mut triangles = squares(meridians, rings - 1, vertex);
     // The squares run down; seen from outside that is clockwise.
     triangles.iter_mut().for_each(|t| t.swap(1, 2));
     for i in 0..meridians {
