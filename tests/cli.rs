@@ -837,7 +837,7 @@ fn a_pipe_that_closes_in_the_middle_is_a_failure_without_a_panic() {
 }
 
 /// Whether a child of this process hears signals: a shell has those that it runs in the background
-/// ignore Ctrl-C, and `nohup` the end of the session.
+/// ignore Ctrl-C, and `nohup` the closing of the terminal.
 #[cfg(target_os = "linux")]
 fn signals_are_heard() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap();

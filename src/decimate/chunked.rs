@@ -41,8 +41,8 @@ const SEVERAL: usize = 4;
 /// way round, the whole is oriented first.
 const DISORIENTED: f64 = 0.005;
 
-/// Chunks leave this share of the collapses to the loop over the whole mesh, which needs room to
-/// choose, or that many triangles that the target is exceeded by the second share.
+/// Chunks leave this share of what is to go to the loop over the whole mesh, which needs room to
+/// choose; but no more than exceeds the target by the second share.
 const LEFT_OVER: f64 = 0.05;
 const MOST_ABOVE_TARGET: f64 = 0.25;
 

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use wide::f32x4;
 
+use super::cost::{cross, dot, minus};
 use super::geometry::Geometry;
 use crate::mesh::{Disks, EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
@@ -224,23 +225,4 @@ fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<
     let stays = (a_is_other + b_is_other).simd_eq(f32x4::ZERO);
     let had_shape = !is_thin(area_squared, &a, &b);
     (!(turns & stays & had_shape).any()).then_some(squared)
-}
-
-#[inline(always)]
-fn cross(a: &[f32x4; 3], b: &[f32x4; 3]) -> [f32x4; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-#[inline(always)]
-fn dot(a: &[f32x4; 3], b: &[f32x4; 3]) -> f32x4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn minus(a: &[f32x4; 3], b: &[f32x4; 3]) -> [f32x4; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::description::{Access, COSTS_OF_LINKED_BOUNDARIES, Description, Words};
-use super::sides::{Corner, Sides};
+use super::sides::{Corner, Sides, replace_edge};
 use super::{CannotCarry, Edge, Face, Flip, Structure, Vertex};
 
 #[derive(Clone, Copy, Debug)]
@@ -172,10 +172,7 @@ impl Flip for HalfEdge {
         self.close(self.half(e).face, [e, ca, ad]);
         self.close(self.half(o).face, [o, db, bc]);
         for (v, gone, new) in [(a, e, ad), (b, o, bc)] {
-            let edge = &mut self.vertices[v.index()].edge;
-            if *edge == Some(gone) {
-                *edge = Some(new);
-            }
+            replace_edge(&mut self.vertices, v, gone, new);
         }
     }
 }

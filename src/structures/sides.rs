@@ -28,6 +28,14 @@ pub(super) struct Corner {
     pub edge: Option<Edge>,
 }
 
+/// Where a vertex has `gone` as its edge, gives it `new`.
+pub(super) fn replace_edge(corners: &mut [Corner], v: Vertex, gone: Edge, new: Edge) {
+    let edge = &mut corners[v.index()].edge;
+    if *edge == Some(gone) {
+        *edge = Some(new);
+    }
+}
+
 /// The sides of an oriented manifold's edges.
 #[derive(Debug)]
 pub(super) struct Sides {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::description::{Access, COSTS_OF_LINKED_BOUNDARIES, Description, Words};
-use super::sides::{Corner, Sides};
+use super::sides::{Corner, Sides, replace_edge};
 use super::{CannotCarry, Edge, Face, Flip, Structure, Vertex};
 
 /// One side of an edge.
@@ -199,10 +199,7 @@ impl Flip for WingedEdge {
         self.close(left.face, [(e, 0), ca, ad]);
         self.close(right.face, [(e, 1), db, bc]);
         for (v, new) in [(a, ad.0), (b, bc.0)] {
-            let edge = &mut self.vertices[v.index()].edge;
-            if *edge == Some(e) {
-                *edge = Some(new);
-            }
+            replace_edge(&mut self.vertices, v, e, new);
         }
     }
 }

@@ -7,7 +7,7 @@ use wide::f32x4;
 use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, doubles, each,
-    places, singular_weight,
+    part, places, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
@@ -110,19 +110,13 @@ fn add_planes<S: EdgeStore>(
     }
 }
 
-/// Four of a quadric's numbers.
-#[inline(always)]
-fn part(quadric: &Quadric, first: usize) -> f32x4 {
-    f32x4::new(*quadric.0[first..].first_chunk().expect("ten numbers"))
-}
-
 impl Accumulated {
     /// The numbers of vertices' quadrics.
     #[inline(always)]
     fn numbers(&self, vertices: [VertexId; LANES]) -> [f32x4; 10] {
-        let quadrics = each(vertices, |v| &self.quadrics[v.index()]);
-        let parts = |i| f32x4::transpose(each(quadrics, |quadric| part(quadric, i)));
-        let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) = (parts(0), parts(4), parts(6));
+        let quadrics = each(vertices, |v| &self.quadrics[v.index()].0);
+        let ([a, b, c, d], [e, f, g, h], [_, _, i, j]) =
+            (part(quadrics, 0), part(quadrics, 4), part(quadrics, 6));
         [a, b, c, d, e, f, g, h, i, j]
     }
 }

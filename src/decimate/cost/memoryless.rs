@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
-use super::{Cost, Evaluation, LANES, between, boundary_weight, doubles, each, places};
+use super::{Cost, Evaluation, LANES, between, boundary_weight, doubles, each, part, places};
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
@@ -121,17 +121,9 @@ impl Memoryless {
 /// The numbers of tensors.
 #[inline(always)]
 fn numbers(tensors: [&Tensor; LANES]) -> [Lanes; 9] {
-    let ([a, b, c, d], [e, f, g, h], [.., i]) =
-        (part(tensors, 0), part(tensors, 4), part(tensors, 5));
+    let lists = each(tensors, |t| &t.numbers);
+    let ([a, b, c, d], [e, f, g, h], [.., i]) = (part(lists, 0), part(lists, 4), part(lists, 5));
     [a, b, c, d, e, f, g, h, i]
-}
-
-/// Four of tensors' numbers.
-#[inline(always)]
-fn part(tensors: [&Tensor; LANES], first: usize) -> [Lanes; 4] {
-    Lanes::transpose(each(tensors, |t| {
-        Lanes::new(*t.numbers[first..].first_chunk().expect("nine numbers"))
-    }))
 }
 
 /// Where an edge's energy is least among the places that keep the volume.

@@ -8,7 +8,7 @@ mod memoryless;
 mod star;
 
 pub use accumulated::Accumulated;
-pub use form::LANES;
+pub use form::{LANES, cross, dot, minus};
 use form::{Lanes, Least, Vector};
 pub use memoryless::Memoryless;
 
@@ -140,6 +140,13 @@ fn doubles<const N: usize>(numbers: &[f32; N]) -> [f64; N] {
         *double = number.into();
     }
     doubles
+}
+
+/// Four of the numbers that each of four lists has, number by number.
+#[inline(always)]
+fn part<const N: usize>(lists: [&[f32; N]; LANES], first: usize) -> [Lanes; 4] {
+    let four = |list: &[f32; N]| Lanes::new(*list[first..].first_chunk().expect("as many numbers"));
+    Lanes::transpose(each(lists, four))
 }
 
 /// The coordinates of vertices.
