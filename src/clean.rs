@@ -38,7 +38,7 @@ const BLOCK: usize = 1 << 14;
 /// and finite; `weld` merges vertices at equal positions first.
 ///
 /// Vertices and faces keep their order, the first of equals stays, with the largest of the welded
-/// vertices' weights. Needs 5 bytes a vertex and 4 a face beside the mesh, and up to 16 a vertex
+/// vertices' weights. The corners keep their attributes, a face folded into another does not. Needs 5 bytes a vertex and 4 a face beside the mesh, and up to 16 a vertex
 /// that has a twin and 10 a face that has one. Linear time, but for a logarithm in the vertices in
 /// one cell of a [`Grid`] and in the faces at a vertex.
 ///
@@ -49,6 +49,9 @@ pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
     let mut parts = mesh.into_parts();
     if weld {
         counts.welded_vertices = weld_positions(&mut parts);
+        if counts.welded_vertices > 0 {
+            parts.attributes.merge_equal_wedges(&parts.triangles);
+        }
     }
     let mut faces = Faces::sift(&parts, &mut counts);
     faces.fold_duplicates(&mut parts, &mut counts);
@@ -56,6 +59,8 @@ pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
     if !keep.is_empty() {
         retain(&keep, &mut parts.triangles);
         retain(&keep, &mut parts.double_sided);
+        parts.attributes.retain_triangles(&keep);
+        parts.attributes.drop_unused_wedges();
     }
     let kept = used.iter().filter(|&&u| u).count();
     if kept < used.len() {

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::attributes::Attributes;
 use crate::error::{Error, Result};
 
 /// The most triangles that three directed edges each can number with 31 bits.
@@ -24,6 +25,7 @@ pub struct IndexedMesh {
     triangles: Vec<[u32; 3]>,
     double_sided: Vec<bool>,
     weights: Vec<f32>,
+    attributes: Attributes,
 }
 
 /// A mesh taken apart.
@@ -39,6 +41,8 @@ pub struct Parts {
     pub double_sided: Vec<bool>,
     /// [`IndexedMesh::weights`].
     pub weights: Vec<f32>,
+    /// [`IndexedMesh::attributes`].
+    pub attributes: Attributes,
 }
 
 impl IndexedMesh {
@@ -80,6 +84,7 @@ impl IndexedMesh {
             triangles,
             double_sided: Vec::new(),
             weights: Vec::new(),
+            attributes: Attributes::default(),
         })
     }
 
@@ -91,11 +96,13 @@ impl IndexedMesh {
             triangles,
             double_sided,
             weights,
+            attributes,
         } = parts;
         if cfg!(debug_assertions) {
             Self::with_origin(origin, positions, triangles)
                 .and_then(|mesh| mesh.with_double_sided(double_sided))
                 .and_then(|mesh| mesh.with_weights(weights))
+                .and_then(|mesh| mesh.with_attributes(attributes))
                 .expect("the parts are those of a mesh")
         } else {
             Self {
@@ -104,6 +111,7 @@ impl IndexedMesh {
                 triangles,
                 double_sided: some_or_none(double_sided, |&is_double| is_double),
                 weights: some_or_none(weights, |&w| w != 1.0),
+                attributes,
             }
         }
     }
@@ -179,6 +187,22 @@ impl IndexedMesh {
         Ok(self)
     }
 
+    /// What the mesh carries beside positions: normals, colours, texture coordinates, groups.
+    pub fn attributes(&self) -> &Attributes {
+        &self.attributes
+    }
+
+    /// Gives the mesh what it carries, in the place of what it carried.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMesh`] where the lists do not fit the triangles or each other, or a wedge is
+    /// used at two vertices.
+    pub fn with_attributes(mut self, attributes: Attributes) -> Result<Self> {
+        attributes.check(&self.triangles)?;
+        self.attributes = attributes;
+        Ok(self)
+    }
+
     /// The number of triangles a file of this mesh holds: double-sided ones count as two.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len() + self.double_sided.iter().filter(|&&d| d).count()
@@ -220,6 +244,7 @@ impl IndexedMesh {
             triangles,
             double_sided,
             weights,
+            attributes,
         } = self;
         Parts {
             origin,
@@ -227,6 +252,7 @@ impl IndexedMesh {
             triangles,
             double_sided,
             weights,
+            attributes,
         }
     }
 
@@ -236,6 +262,7 @@ impl IndexedMesh {
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.double_sided.capacity()
             + self.weights.capacity() * size_of::<f32>()
+            + self.attributes.bytes()
     }
 }
 
@@ -349,6 +376,10 @@ pub struct MeshBuilder {
     doubles: Vec<DVec3>,
     faces: Faces,
     weights: Vec<f32>,
+    /// What is carried beside; of the corners what was pushed with wedges.
+    attributes: Attributes,
+    /// Where runs of triangles of a group begin, and the group.
+    groups: Vec<(usize, u32)>,
 }
 
 /// What becomes of the faces that a reader finds.
@@ -454,6 +485,26 @@ impl MeshBuilder {
         }
     }
 
+    /// Adds a polygon as [`push_polygon`](Self::push_polygon) does, its corners with wedges: either all
+    /// faces come with them, or none and the wedges are the vertices.
+    pub fn push_polygon_with(&mut self, corners: &[u32], wedges: &[u32]) {
+        debug_assert_eq!(corners.len(), wedges.len());
+        self.push_polygon(corners);
+        self.attributes.corners.extend(fan(wedges));
+    }
+
+    /// Lets the faces that come from now on be of this group.
+    pub fn begin_group(&mut self, group: u32) {
+        if self.groups.last().is_none_or(|&(_, last)| last != group) {
+            self.groups.push((self.face_count(), group));
+        }
+    }
+
+    /// What the mesh will carry beside: its channels and groups are the reader's to fill.
+    pub fn attributes(&mut self) -> &mut Attributes {
+        &mut self.attributes
+    }
+
     /// Weighs the next vertex; see [`IndexedMesh::with_weights`].
     pub fn push_weight(&mut self, weight: f32) {
         self.weights.push(weight);
@@ -475,7 +526,7 @@ impl MeshBuilder {
     /// The mesh, with the origin that its coordinates ask for.
     ///
     /// # Errors
-    /// As [`IndexedMesh::new`] and [`IndexedMesh::with_weights`].
+    /// As [`IndexedMesh::new`], [`IndexedMesh::with_weights`] and [`IndexedMesh::with_attributes`].
     pub fn finish(mut self) -> Result<IndexedMesh> {
         let mut triangles = match std::mem::take(&mut self.faces) {
             Faces::Triangles(list) => list,
@@ -484,8 +535,22 @@ impl MeshBuilder {
         check_sizes(self.vertex_count(), triangles.len())?;
         triangles.shrink_to_fit();
         let weights = std::mem::take(&mut self.weights);
+        let mut attributes = std::mem::take(&mut self.attributes);
+        if attributes.channels.is_empty() {
+            attributes.corners = Vec::new();
+        } else if attributes.corners.is_empty() {
+            attributes.corners.clone_from(&triangles);
+        }
+        let groups = std::mem::take(&mut self.groups);
+        let ends = groups.iter().skip(1).map(|&(begin, _)| begin);
+        for (&(begin, group), end) in groups.iter().zip(ends.chain([triangles.len()])) {
+            // What came before the first is of the first.
+            attributes.group_of.resize(begin, group);
+            attributes.group_of.resize(end, group);
+        }
         let (origin, positions) = self.finish_positions();
-        IndexedMesh::with_origin(origin, positions, triangles)?.with_weights(weights)
+        let mesh = IndexedMesh::with_origin(origin, positions, triangles)?;
+        mesh.with_weights(weights)?.with_attributes(attributes)
     }
 
     /// The mesh with its polygons as they came.

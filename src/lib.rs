@@ -20,7 +20,8 @@
 //! Data flows one way: [`io`] makes an [`indexed_mesh::IndexedMesh`], [`clean`] makes a simplicial
 //! complex of it, [`decimate`] turns it into another over a [`mesh::Mesh`] in one of three memory
 //! tiers, [`io`] writes it, [`metrics`] says what is in it, [`repair`] makes it manifold. [`spatial`]
-//! puts positions in an order in which neighbours stand together. [`structures`] holds the mesh
+//! puts positions in an order in which neighbours stand together. [`attributes`] are what a mesh
+//! carries beside positions. [`structures`] holds the mesh
 //! structures that the paper compares, for comparison and teaching.
 //!
 //! # Limits
@@ -29,6 +30,7 @@
 //! made; a memory limit is held against what decimation will need before it begins. Nothing here
 //! prints or exits, and what the functions of [`mesh`] ask of their arguments is said at each.
 
+pub mod attributes;
 pub mod clean;
 pub mod decimate;
 pub mod error;

@@ -76,6 +76,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     let read_options = ReadOptions {
         format: args.input_format,
         vertex_weight: args.vertex_weight.clone(),
+        ..ReadOptions::default()
     };
     let mesh = io::read(input, &read_options)?;
     let read_seconds = start.elapsed().as_secs_f64();

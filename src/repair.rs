@@ -76,6 +76,7 @@ fn cut_clean(mesh: IndexedMesh) -> Result<(IndexedMesh, usize)> {
         triangles,
         double_sided,
         mut weights,
+        mut attributes,
     } = mesh.into_parts();
     let Oriented { mesh, flipped, .. } = Mesh::<Small>::oriented(positions.len(), triangles);
     let cut = mesh.cut();
@@ -90,9 +91,11 @@ fn cut_clean(mesh: IndexedMesh) -> Result<(IndexedMesh, usize)> {
             weights.push(weights[v]);
         }
     }
+    attributes.split_shared_wedges(&triangles);
     let mesh = IndexedMesh::with_origin(origin, positions, triangles)?
         .with_double_sided(double_sided)?
-        .with_weights(weights)?;
+        .with_weights(weights)?
+        .with_attributes(attributes)?;
     Ok((mesh, cut.copies.len()))
 }
 

@@ -10,18 +10,20 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     ("error", &[]),
-    ("indexed_mesh", &["error"]),
+    ("attributes", &["error"]),
+    ("indexed_mesh", &["error", "attributes"]),
     ("mesh", &[]),
     ("nearest", &[]),
     ("spatial", &[]),
     ("clean", &["error", "indexed_mesh", "spatial"]),
-    ("io", &["error", "indexed_mesh"]),
+    ("io", &["error", "attributes", "indexed_mesh"]),
     (
         "decimate",
         &[
             "error",
+            "attributes",
             "indexed_mesh",
             "clean",
             "mesh",
@@ -31,7 +33,14 @@ const ARROWS: [(&str, &[&str]); 11] = [
     ),
     (
         "metrics",
-        &["error", "indexed_mesh", "clean", "mesh", "nearest"],
+        &[
+            "error",
+            "attributes",
+            "indexed_mesh",
+            "clean",
+            "mesh",
+            "nearest",
+        ],
     ),
     (
         "repair",

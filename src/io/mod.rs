@@ -91,13 +91,26 @@ impl FromStr for Format {
 const KNOWN_FORMATS: &str = "ply, obj, stl or off";
 
 /// How a mesh is read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadOptions {
     /// The format, or `None` for the one that content or extension tell.
     pub format: Option<Format>,
     /// The scalar property of a PLY file's vertices that becomes their
     /// [weight](IndexedMesh::weights).
     pub vertex_weight: Option<String>,
+    /// Whether to read what the mesh carries beside positions, too: normals, colours, texture
+    /// coordinates, groups.
+    pub attributes: bool,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            format: None,
+            vertex_weight: None,
+            attributes: true,
+        }
+    }
 }
 
 /// How a mesh is written.

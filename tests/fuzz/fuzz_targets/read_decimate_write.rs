@@ -38,7 +38,7 @@ fn read(bytes: Vec<u8>, format: Format) -> Option<IndexedMesh> {
     let length = Some(bytes.len() as u64);
     let options = ReadOptions {
         format: Some(format),
-        vertex_weight: None,
+        ..ReadOptions::default()
     };
     read_from(Path::new("a"), Cursor::new(bytes), length, &options).ok()
 }

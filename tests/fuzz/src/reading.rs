@@ -57,6 +57,7 @@ fn read(
     let options = ReadOptions {
         format: Some(format),
         vertex_weight,
+        ..ReadOptions::default()
     };
     io::read_from(Path::new(NAME), source, length, &options)
 }
