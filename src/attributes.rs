@@ -247,6 +247,15 @@ impl Attributes {
             + values.sum::<usize>()
     }
 
+    /// Drops what the corners and triangles say, and keeps what it was about.
+    pub(crate) fn forget_values(&mut self) {
+        self.corners = Vec::new();
+        self.group_of = Vec::new();
+        for channel in &mut self.channels {
+            channel.values = Values::of(&channel.components);
+        }
+    }
+
     /// Keeps the wedges that a corner names, in their order.
     pub fn drop_unused_wedges(&mut self) {
         let mut is_used = vec![false; self.wedge_count()];

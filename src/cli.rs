@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use decimate::decimate::{
-    Boundary, Chunks, Options, Placement, Quality, Targets, TierChoice, Topology,
+    AttributeUse, AttributeWeights, Boundary, Chunks, Options, Placement, Quality, Targets,
+    TierChoice, Topology,
 };
 use decimate::io::Format;
 use decimate::mesh::Tier;
@@ -204,6 +205,14 @@ pub struct Run {
     /// Where merged vertices go.
     #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
     pub placement: PlacementArg,
+    /// What becomes of normals, colours, texture coordinates and materials.
+    #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
+    pub attributes: AttributesArg,
+    /// How much an attribute weighs against positions: normal, color, texture or scalar, and a share
+    /// of the mesh's diagonal that weighs as much as a change by all of the attribute's range. May be
+    /// given several times.
+    #[arg(long, value_name = "KIND=WEIGHT", value_parser = parse_weight, help_heading = "Surface")]
+    pub weight: Vec<(WeightKind, f64)>,
     /// Keep vertices at equal positions apart (they are welded otherwise).
     #[arg(long, help_heading = "Surface")]
     pub no_weld: bool,
@@ -309,7 +318,56 @@ pub enum TierArg {
     Small,
 }
 
+/// `--attributes`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum AttributesArg {
+    /// They are dropped
+    Ignore,
+    /// They go along and cost nothing; seams may smear
+    Carry,
+    /// They count in the cost; seams stay, textures do not fold
+    #[default]
+    Optimize,
+}
+
+/// What `--weight` weighs.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+#[allow(missing_docs)]
+pub enum WeightKind {
+    Normal,
+    Color,
+    Texture,
+    Scalar,
+}
+
+/// A kind and its weight.
+fn parse_weight(text: &str) -> Result<(WeightKind, f64), String> {
+    let expected = "expected normal, color, texture or scalar, =, and a number of 0 or more";
+    let (kind, weight) = text.split_once('=').ok_or(expected)?;
+    let kind = WeightKind::from_str(kind, true).map_err(|_| expected)?;
+    let weight: f64 = weight.parse().map_err(|_| expected)?;
+    if weight.is_finite() && weight >= 0.0 {
+        Ok((kind, weight))
+    } else {
+        Err(expected.into())
+    }
+}
+
 impl Run {
+    /// How much attributes weigh.
+    fn attribute_weights(&self) -> AttributeWeights {
+        let mut weights = AttributeWeights::default();
+        for &(kind, weight) in &self.weight {
+            *match kind {
+                WeightKind::Normal => &mut weights.normal,
+                WeightKind::Color => &mut weights.color,
+                WeightKind::Texture => &mut weights.texture,
+                WeightKind::Scalar => &mut weights.scalar,
+            } = weight;
+        }
+        weights
+    }
+
     /// The library's options.
     pub fn options(&self) -> Options {
         Options {
@@ -324,6 +382,12 @@ impl Run {
                 QualityArg::Best => Quality::Best,
             },
             feature_angle_degrees: self.feature_angle,
+            attributes: match self.attributes {
+                AttributesArg::Ignore => AttributeUse::Ignore,
+                AttributesArg::Carry => AttributeUse::Carry,
+                AttributesArg::Optimize => AttributeUse::Optimize,
+            },
+            attribute_weights: self.attribute_weights(),
             boundary: match self.boundary {
                 BoundaryArg::Keep => Boundary::Keep,
                 BoundaryArg::Lock => Boundary::Lock,

@@ -76,7 +76,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     let read_options = ReadOptions {
         format: args.input_format,
         vertex_weight: args.vertex_weight.clone(),
-        ..ReadOptions::default()
+        attributes: args.attributes != cli::AttributesArg::Ignore,
     };
     let mesh = io::read(input, &read_options)?;
     let read_seconds = start.elapsed().as_secs_f64();
@@ -112,6 +112,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
 fn show_info(args: &InfoArgs) -> Result<ExitCode, Error> {
     let read_options = ReadOptions {
         format: args.input_format,
+        attributes: false,
         ..ReadOptions::default()
     };
     let mesh = io::read(&args.mesh, &read_options)?;

@@ -23,6 +23,7 @@ use super::options::{Chunks, Options, Topology};
 use super::queue::Buckets;
 use super::report::Tally;
 use super::surface::Surface;
+use super::wedges::FlatWedges;
 use crate::clean::{rename, renumbered, retain};
 use crate::error::Result;
 use crate::mesh::{EdgeStore, FaceId, Mesh, Outgoing, VertexId};
@@ -380,6 +381,8 @@ struct Chunk<S: EdgeStore, C: Cost<S>> {
     /// Of these, the ones that are on no seam.
     inner: usize,
     triangles_before: usize,
+    /// The wedges by their numbers in the whole.
+    wedges: Vec<u32>,
     /// Whether anything is said of the faces of the whole.
     has_flags: bool,
     singular: Singular,
@@ -390,6 +393,8 @@ struct Outcome<V> {
     /// By the vertices' numbers in the whole.
     triangles: Vec<[u32; 3]>,
     flags: Vec<FaceFlags>,
+    /// What is carried, and the wedges' numbers in the whole.
+    wedges: (FlatWedges, Vec<u32>),
     /// Inner vertices that are left, ascending.
     kept: Vec<Kept<V>>,
     /// The chunk's own vertices that were kept out of it, although all of their faces are in it.
@@ -405,6 +410,8 @@ impl<V> Outcome<V> {
     /// The bytes held.
     fn bytes(&self) -> usize {
         self.triangles.capacity() * size_of::<[u32; 3]>()
+            + self.wedges.0.bytes()
+            + self.wedges.1.capacity() * size_of::<u32>()
             + self.kept.capacity() * size_of::<Kept<V>>()
             + self.of_seam.capacity() * size_of::<(u32, V)>()
             + self.singular.rim.capacity() * size_of::<RimEdge>()
@@ -489,7 +496,10 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         let mut vertices: Vec<u32> = Vec::with_capacity(own + others.len());
         vertices.extend(range.clone().map(|v| v as u32));
         vertices.append(&mut others);
+        let ranges: Vec<Range<usize>> = cut.faces(chunk).collect();
+        let (carried, wedges) = flat.wedges.gather(ranges.into_iter());
         let gathered = Flat {
+            wedges: carried,
             positions: gather(&flat.positions, &vertices),
             locked: gather(&flat.locked, &vertices),
             weights: gather(&flat.weights, &vertices),
@@ -534,6 +544,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             vertices,
             own,
             inner,
+            wedges,
             has_flags: !flat.flags.is_empty(),
             singular,
         }
@@ -611,6 +622,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
                 .map(|f| mesh.face_vertices(f).map(number))
                 .collect(),
             flags: Vec::new(),
+            wedges: (FlatWedges::default(), self.wedges),
             kept: Vec::with_capacity(self.inner - tally.collapses),
             held: Vec::new(),
             of_seam: Vec::new(),
@@ -642,6 +654,8 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
                 });
             }
         }
+        let Surface { mesh, wedges, .. } = surface;
+        outcome.wedges.0 = wedges.into_flat(&mesh);
         outcome
     }
 }
@@ -695,15 +709,28 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     let left = outcomes.iter().flatten().map(|o| o.triangles.len()).sum();
     let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(left);
     let mut flags = Vec::new();
+    let mut carried = FlatWedges {
+        layout: flat.wedges.layout.clone(),
+        ..FlatWedges::default()
+    };
     for (k, outcome) in outcomes.iter_mut().enumerate() {
         let Some(outcome) = outcome else {
             // Cancelled before its turn.
             for range in cut.faces(k) {
                 triangles.extend_from_slice(&flat.triangles[range.clone()]);
-                flags.extend(flat.flags.get(range).into_iter().flatten());
+                flags.extend(flat.flags.get(range.clone()).into_iter().flatten());
+                let wedges = &flat.wedges;
+                let corners = wedges.corners.get(range.clone());
+                carried.corners.extend(corners.into_iter().flatten());
+                carried
+                    .groups
+                    .extend(wedges.groups.get(range).into_iter().flatten());
             }
             continue;
         };
+        let (part, wedges) = std::mem::take(&mut outcome.wedges);
+        carried.append(&part, &wedges);
+        flat.wedges.take_values(&part, &wedges);
         triangles.append(&mut outcome.triangles);
         flags.append(&mut outcome.flags);
         for v in cut.vertices(k) {
@@ -762,6 +789,9 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     }
     flat.triangles = triangles;
     flat.flags = flags;
+    carried.values = std::mem::take(&mut flat.wedges.values);
+    carried.drop_unused();
+    flat.wedges = carried;
     non_manifold_edges
 }
 

@@ -75,7 +75,7 @@ impl Cut {
         }
         cut.shared
             .resize_with(renamed.len(), || AtomicBool::new(false));
-        let has_flags = !flat.flags.is_empty();
+        let has_more = !flat.flags.is_empty() || !flat.wedges.is_nothing();
         let (begins, orders) = flat
             .triangles
             .par_chunks_mut(cut.block_faces)
@@ -84,17 +84,13 @@ impl Cut {
                     *v = renamed[*v as usize];
                 }
                 let (begins, order) = cut.sort_block(block);
-                (begins, Some(order).filter(|_| has_flags))
+                (begins, Some(order).filter(|_| has_more))
             })
             .unzip::<_, _, Vec<_>, Vec<_>>();
         cut.begins_in_block = begins;
-        if has_flags {
-            let blocks = flat.flags.par_chunks_mut(cut.block_faces);
-            blocks.zip(orders).for_each(|(block, order)| {
-                let sorted: Vec<_> = order.iter().flatten().map(|&i| block[i as usize]).collect();
-                block.copy_from_slice(&sorted);
-            });
-        }
+        permute_blocks(&mut flat.flags, &orders, cut.block_faces);
+        permute_blocks(&mut flat.wedges.corners, &orders, cut.block_faces);
+        permute_blocks(&mut flat.wedges.groups, &orders, cut.block_faces);
         cut
     }
 
@@ -181,6 +177,19 @@ fn cuts(positions: &[Vec3], grid: &Grid, chunk_vertices: &Range<usize>, group: u
     }
     begins.push(positions.len() as u32);
     begins
+}
+
+/// Puts the elements of each block in an order.
+fn permute_blocks<T: Copy + Send + Sync>(
+    values: &mut [T],
+    orders: &[Option<Vec<u32>>],
+    block: usize,
+) {
+    let blocks = values.par_chunks_mut(block).zip(orders);
+    blocks.for_each(|(block, order)| {
+        let sorted: Vec<T> = order.iter().flatten().map(|&i| block[i as usize]).collect();
+        block.copy_from_slice(&sorted);
+    });
 }
 
 fn permute<T: Clone + Send + Sync>(values: &mut Vec<T>, order: &[u32]) {

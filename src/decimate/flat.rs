@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::geometry::Geometry;
 use super::surface::Surface;
+use super::wedges::FlatWedges;
 use crate::indexed_mesh::Parts;
 use crate::mesh::{Compaction, EdgeStore, FaceId, Mesh};
 
@@ -59,6 +60,8 @@ pub struct Flat<V> {
     pub states: Vec<V>,
     /// What is known of the faces.
     pub flags: Vec<FaceFlags>,
+    /// What the corners and faces carry.
+    pub wedges: FlatWedges,
     /// Whether creases are kept, though there may be none.
     pub creased: bool,
 }
@@ -86,6 +89,7 @@ impl<V> Flat<V> {
             deviation: Vec::new(),
             states: Vec::new(),
             flags,
+            wedges: FlatWedges::default(),
             creased: false,
         };
         flat.weigh(parts.weights);
@@ -168,6 +172,7 @@ impl<V> Flat<V> {
             lost: 0.0,
             turned: was_turned,
             geometry: Geometry::new(self.positions, scale),
+            wedges: self.wedges.into_wedges(&mesh, turned),
             mesh,
             seam: Vec::new(),
         };
@@ -189,6 +194,7 @@ impl<S: EdgeStore> Surface<S> {
             Vec::new()
         };
         let creased = !self.creases.is_empty();
+        let wedges = self.wedges.into_flat(&self.mesh);
         let Self {
             mut mesh,
             geometry,
@@ -211,6 +217,7 @@ impl<S: EdgeStore> Surface<S> {
             deviation,
             states: Vec::new(),
             flags,
+            wedges,
             creased,
         }
     }

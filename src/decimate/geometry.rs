@@ -31,6 +31,11 @@ impl Geometry {
     }
 
     /// The positions, one a vertex slot.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The positions, one a vertex slot.
     pub fn into_positions(self) -> Vec<Vec3> {
         self.positions
     }

@@ -9,7 +9,7 @@ use super::cost::{Cost, Evaluation, LANES};
 use super::options::Topology;
 use super::queue::{Age, Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
-use super::surface::{Loss, Merged, Surface, Way};
+use super::surface::{Loss, Merged, Plan, Surface, Way};
 use crate::error::{Error, Result};
 use crate::mesh::{Disks, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
 
@@ -252,11 +252,14 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 }
                 Err(Rejection::Flip) => self.tally.rejected_flip += 1,
                 Err(Rejection::Error) => self.tally.rejected_error += 1,
-                Ok((Way::Contract(_, loss), _)) if loss.price > candidate.cost => {
+                Ok(Plan {
+                    way: Way::Contract(_, loss),
+                    ..
+                }) if loss.price > candidate.cost => {
                     self.queue_at(e, loss.price.into());
                 }
-                Ok((way, deviation)) => {
-                    let merged = self.collapse(e, position, &way, deviation);
+                Ok(plan) => {
+                    let merged = self.collapse(e, position, &plan);
                     if check {
                         self.surface.mesh.check().map_err(|wrong| {
                             Error::Internal(format!("after {:?}: {wrong}", merged.collapse))
@@ -483,14 +486,15 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         name != e && self.queue.contains(name)
     }
 
-    /// How `e` can be collapsed to `position`, with what the mesh says of its [disks](crate::mesh::Mesh::disks), and the deviation after it, or why it cannot.
+    /// How `e` can be collapsed to `position`, with what the mesh says of its
+    /// [disks](crate::mesh::Mesh::disks), or why it cannot.
     #[inline]
     fn way<'a>(
         &self,
         e: EdgeId,
         disks: Option<&'a Disks>,
         position: Vec3,
-    ) -> std::result::Result<(Way<'a>, f32), Rejection> {
+    ) -> std::result::Result<Plan<'a>, Rejection> {
         let mesh = &self.surface.mesh;
         let keeps_topology = match disks {
             Some(disks) => disks.link_condition(),
@@ -510,9 +514,17 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             .max_error
             .is_some_and(|limit| f64::from(deviation) > limit)
         {
-            Err(Rejection::Error)
+            return Err(Rejection::Error);
+        }
+        let carried = self.cost.carried(&self.surface, e, position);
+        if self.surface.wedges.keeps_charts(mesh, e, &carried) {
+            Ok(Plan {
+                way,
+                deviation,
+                carried,
+            })
         } else {
-            Ok((way, deviation))
+            Err(Rejection::Flip)
         }
     }
 
@@ -626,7 +638,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.reconsider();
     }
 
-    fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f32) -> Merged {
+    fn collapse(&mut self, e: EdgeId, position: Vec3, plan: &Plan) -> Merged {
         let mesh = &self.surface.mesh;
         if mesh.non_manifold_edge_count() + mesh.multi_fan_vertex_count() > 0 {
             let ends = mesh.edge_vertices(e);
@@ -636,11 +648,11 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 self.tally.collapses_non_manifold += 1;
             }
         }
-        if let Way::Contract(_, loss) = way {
+        if let Way::Contract(_, loss) = &plan.way {
             self.tally.contractions += 1;
             self.surface.lost = self.surface.lost.max(loss.reach);
         }
-        let merged = self.surface.collapse(e, position, way, deviation);
+        let merged = self.surface.collapse(e, position, plan);
         if self.topology == Topology::Simplify {
             self.free_faces.extend(&merged.collapse.dead_faces);
             self.free_vertices.push(merged.collapse.removed);

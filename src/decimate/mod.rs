@@ -14,28 +14,34 @@ mod report;
 mod rules;
 mod surface;
 mod symmetric;
+mod wedges;
 
 use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::Vec3;
 
+use crate::attributes::Attributes;
 use crate::clean::{Cleaning, clean};
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
 use crate::mesh::{EdgeStore, Full, Medium, Mesh, Oriented, Small, Tier, turn_round};
 
 pub use memory::{available_bytes, needed_bytes, peak_rss_bytes};
-pub use options::{Boundary, Chunks, Options, Placement, Quality, Targets, TierChoice, Topology};
+pub use options::{
+    AttributeUse, AttributeWeights, Boundary, Chunks, Options, Placement, Quality, Targets,
+    TierChoice, Topology,
+};
 pub use report::{Blocked, Report, StopReason, Tally};
 
 use chunked::Chunked;
-use cost::{Accumulated, Cost, Memoryless};
+use cost::{Accumulated, AttributeForms, Cost, Memoryless};
 use fit::{Arrays, Terms, fit_to_original};
 use flat::Flat;
 use geometry::scale_to_unit;
 use greedy::{Greedy, Stop};
 use surface::Surface;
+use wedges::FlatWedges;
 
 /// How far decimation has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,9 +158,21 @@ fn run<S: EdgeStore, C: Cost<S>>(
 ) -> Result<IndexedMesh> {
     let start = Instant::now();
     let scale = scale_to_unit(input.diagonal());
-    let parts = input.into_parts();
+    let mut parts = input.into_parts();
     let origin = parts.origin;
+    let mut attributes = std::mem::take(&mut parts.attributes);
+    if options.attributes == AttributeUse::Ignore {
+        attributes = Attributes::default();
+    }
     let mut flat = Flat::<C::State>::of(parts);
+    let triangles_start = flat.triangle_count();
+    // What is not decimated keeps its attributes as they are, in whatever precision.
+    let is_carried = report.target_triangles < triangles_start;
+    if is_carried {
+        let geometry = (&flat.positions[..], &flat.triangles[..]);
+        flat.wedges = FlatWedges::of(&attributes, geometry, scale, options);
+        attributes.forget_values();
+    }
     // Single precision has no room for the scale of a tiny mesh, and takes a larger one exactly.
     let unit = if scale > MODERATE { scale } else { 1.0 };
     rescale(&mut flat.positions, unit);
@@ -164,7 +182,6 @@ fn run<S: EdgeStore, C: Cost<S>>(
         max_error: options.targets.max_error.map(|e| e * scale),
         max_cost: f32::INFINITY,
     };
-    let triangles_start = flat.triangle_count();
     let triangles_target = stop.triangles.min(triangles_start);
     let mut job = Job {
         options,
@@ -190,8 +207,9 @@ fn run<S: EdgeStore, C: Cost<S>>(
         progress: job.progress,
     };
     if chunked.is_worthwhile(&flat) {
-        let needs_whole =
-            options.boundary == Boundary::Lock || options.feature_angle_degrees.is_some();
+        let needs_whole = options.boundary == Boundary::Lock
+            || options.feature_angle_degrees.is_some()
+            || !flat.wedges.is_nothing();
         is_prepared = needs_whole;
         if needs_whole {
             flat = prepared(flat, options, scale_of_unit, report);
@@ -252,6 +270,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
         mut positions,
         mut triangles,
         flags,
+        mut wedges,
         ..
     } = surface.into_flat::<()>();
     rescale(&mut positions, unit.recip());
@@ -261,9 +280,17 @@ fn run<S: EdgeStore, C: Cost<S>>(
         double_sided.extend(flags.iter().map(|f| f.is_double_sided()));
     }
     turn_round(&mut triangles, &turned);
+    turn_round(&mut wedges.corners, &turned);
+    if is_carried {
+        wedges.write_to(&mut attributes);
+    }
+    if report.tally.pinched_handles > 0 {
+        attributes.split_shared_wedges(&triangles);
+    }
     report.vertices_out = positions.len();
-    let output =
-        IndexedMesh::with_origin(origin, positions, triangles)?.with_double_sided(double_sided)?;
+    let output = IndexedMesh::with_origin(origin, positions, triangles)?
+        .with_double_sided(double_sided)?
+        .with_attributes(attributes)?;
     report.decimate_seconds = start.elapsed().as_secs_f64() + report.chunk_seconds;
     Ok(output)
 }
@@ -349,7 +376,14 @@ impl Job<'_> {
             if stopped.0 == StopReason::Cancelled || faces == faces_before {
                 return Ok((surface, stopped));
             }
+            let forms = AttributeForms::new(&surface);
+            let before = forms
+                .as_ref()
+                .map(|_| surface.geometry.positions().to_vec());
             let bytes = fit_to_original(&mut surface, original, &terms);
+            if let (Some(forms), Some(before)) = (forms, before) {
+                forms.follow(&mut surface, &before);
+            }
             self.tally.working_bytes = self.tally.working_bytes.max(bytes);
             if options.check {
                 let wrong = |wrong| Error::Internal(format!("after fitting: {wrong}"));

@@ -1,5 +1,6 @@
 //! What a caller can ask for.
 
+use crate::attributes::Kind;
 use crate::error::{Error, Result};
 use crate::mesh::Tier;
 
@@ -79,6 +80,60 @@ pub enum Chunks {
     Triangles(usize),
 }
 
+/// What becomes of what a mesh [carries](crate::attributes::Attributes) beside positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum AttributeUse {
+    /// It is dropped.
+    Ignore,
+    /// It is interpolated along each edge that collapses, and costs nothing. Groups of faces stay
+    /// apart; seams are not kept.
+    Carry,
+    /// It has its part in what a collapse costs and where its vertex goes, and takes the values that
+    /// are best there (Hoppe 1999). Seams stay seams: collapses go along them, on both sides at once,
+    /// and no texture triangle turns over.
+    #[default]
+    Optimize,
+}
+
+/// How much attributes weigh against positions: a change by the unit that is named, over an area, weighs
+/// as much as a distance of so much of the mesh's diagonal, about, over the same area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct AttributeWeights {
+    /// A normal's change by a radian, about.
+    pub normal: f64,
+    /// A colour's change from black to white.
+    pub color: f64,
+    /// A texture's shift on the surface, relative to the shift: 1 for a distance as long.
+    pub texture: f64,
+    /// A scalar's change by all that there is between the least and the greatest.
+    pub scalar: f64,
+}
+
+impl Default for AttributeWeights {
+    fn default() -> Self {
+        Self {
+            normal: 0.003,
+            color: 0.01,
+            texture: 0.1,
+            scalar: 0.0,
+        }
+    }
+}
+
+impl AttributeWeights {
+    /// The weight of a kind.
+    pub fn of(&self, kind: Kind) -> f64 {
+        match kind {
+            Kind::Normal => self.normal,
+            Kind::Color => self.color,
+            Kind::TextureCoordinate => self.texture,
+            Kind::Scalar => self.scalar,
+        }
+    }
+}
+
 /// Which memory tier to decimate in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TierChoice {
@@ -104,6 +159,10 @@ pub struct Options {
     pub placement: Placement,
     /// Edges at which the surface turns by more than this are kept as curves; none where not given.
     pub feature_angle_degrees: Option<f64>,
+    /// What becomes of normals, colours, texture coordinates, groups and the like.
+    pub attributes: AttributeUse,
+    /// How much they weigh.
+    pub attribute_weights: AttributeWeights,
     /// Whether pieces of the mesh are decimated on their own first.
     pub chunks: Chunks,
     /// The memory tier.
@@ -126,6 +185,8 @@ impl Default for Options {
             topology: Topology::default(),
             placement: Placement::default(),
             feature_angle_degrees: None,
+            attributes: AttributeUse::default(),
+            attribute_weights: AttributeWeights::default(),
             chunks: Chunks::default(),
             tier: TierChoice::default(),
             memory_limit_bytes: None,
@@ -142,6 +203,24 @@ impl Options {
     /// [`Error::InvalidOptions`] that names the number and what was expected.
     pub fn check(&self) -> Result<()> {
         self.targets.triangles_of(0)?;
+        let AttributeWeights {
+            normal,
+            color,
+            texture,
+            scalar,
+        } = self.attribute_weights;
+        for (name, weight) in [
+            ("normal", normal),
+            ("color", color),
+            ("texture", texture),
+            ("scalar", scalar),
+        ] {
+            if !(weight.is_finite() && weight >= 0.0) {
+                return Err(Error::InvalidOptions(format!(
+                    "{name} weight {weight}: a number of 0 or more is expected"
+                )));
+            }
+        }
         match self.feature_angle_degrees {
             Some(degrees) if !(0.0..=180.0).contains(&degrees) => Err(Error::InvalidOptions(
                 format!("feature angle {degrees}: an angle of 0 to 180 degrees is expected"),

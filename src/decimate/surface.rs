@@ -4,8 +4,9 @@ use glam::{DVec3, Vec3};
 use smallvec::SmallVec;
 
 use super::geometry::Geometry;
-use super::options::{Boundary, Options};
+use super::options::{AttributeUse, Boundary, Options};
 use super::rules;
+use super::wedges::{Carried, Wedges};
 use crate::mesh::{Collapse, Contraction, Disks, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 
 /// A collapse, and where its ends were.
@@ -24,6 +25,15 @@ pub enum Way<'a> {
     Collapse(Option<&'a Disks>),
     /// As this says, which changes the topology and costs so much.
     Contract(Contraction, Loss),
+}
+
+/// How an edge is collapsed, and what of it was found out beforehand.
+pub struct Plan<'a> {
+    pub way: Way<'a>,
+    /// What [`Surface::deviation_after`] said.
+    pub deviation: f32,
+    /// What the wedges of both ends become.
+    pub carried: Carried,
 }
 
 /// What a change of the topology costs.
@@ -49,6 +59,8 @@ pub struct Surface<S> {
     pub turned: Vec<bool>,
     /// One flag a directed edge that is kept as part of a curve, or nothing where none is.
     pub creases: Vec<bool>,
+    /// What the corners and faces carry.
+    pub wedges: Wedges,
     /// What the cost is multiplied by around each vertex, or nothing where by 1.
     pub weights: Vec<f32>,
     /// An estimate of how far each vertex is from the original, in the unit box.
@@ -97,6 +109,26 @@ impl<S: EdgeStore> Surface<S> {
         }
         if let Some(degrees) = options.feature_angle_degrees {
             self.mark_creases(degrees);
+        }
+        if options.attributes == AttributeUse::Optimize {
+            self.wedges.smooth(&self.mesh);
+        }
+        self.mark_attribute_seams(options.attributes);
+    }
+
+    /// Marks the borders of groups as creases, and attribute seams unless attributes are but carried.
+    fn mark_attribute_seams(&mut self, usage: AttributeUse) {
+        let (mesh, wedges) = (&self.mesh, &self.wedges);
+        let is_kept = |e: EdgeId| match usage {
+            AttributeUse::Optimize => wedges.is_seam(mesh, e) || wedges.is_border(mesh, e),
+            AttributeUse::Carry | AttributeUse::Ignore => wedges.is_border(mesh, e),
+        };
+        let edges = mesh.faces().flat_map(FaceId::edges);
+        let kept: Vec<EdgeId> = edges.filter(|&e| is_kept(e)).collect();
+        if !kept.is_empty() {
+            self.creases.resize(3 * mesh.face_slots(), false);
+            kept.into_iter()
+                .for_each(|e| self.creases[e.index()] = true);
         }
     }
 
@@ -205,8 +237,7 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried.
-    /// `deviation` is what [`deviation_after`](Self::deviation_after) said.
-    pub fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f32) -> Merged {
+    pub fn collapse(&mut self, e: EdgeId, position: Vec3, plan: &Plan) -> Merged {
         let from = self
             .mesh
             .edge_vertices(e)
@@ -219,7 +250,7 @@ impl<S: EdgeStore> Surface<S> {
             let star = self.mesh.edge_star(e).into_iter();
             star.filter(has_crease).map(EdgeId::face).collect()
         };
-        let (collapse, around) = match way {
+        let (collapse, around) = match &plan.way {
             Way::Collapse(disks) => (self.mesh.collapse_between(e, *disks), Vec::new()),
             Way::Contract(contraction, _) => (
                 self.mesh.contract(contraction),
@@ -244,7 +275,10 @@ impl<S: EdgeStore> Surface<S> {
                 }
             }
         }
-        self.deviation[collapse.kept.index()] = deviation;
+        if !self.wedges.is_empty() {
+            self.wedges.adopt(&self.mesh, collapse.kept, &plan.carried);
+        }
+        self.deviation[collapse.kept.index()] = plan.deviation;
         Merged {
             collapse,
             from,
@@ -288,6 +322,13 @@ impl<S: EdgeStore> Surface<S> {
             }
         }
         self.mesh.pinch(edges, caps, vertices);
+        if !self.wedges.is_empty() {
+            vertices
+                .into_iter()
+                .for_each(|v| self.wedges.part(&self.mesh, v));
+            caps.into_iter()
+                .for_each(|f| self.wedges.adopt_face(&self.mesh, f));
+        }
         for cap in caps {
             self.revive(cap, edges[0].face());
         }
@@ -325,7 +366,11 @@ impl<S: EdgeStore> Surface<S> {
     /// Puts the dead `face` between the boundary edge `e` and the one behind it; its vertices.
     pub fn fill(&mut self, e: EdgeId, face: FaceId) -> [VertexId; 3] {
         self.revive(face, e.face());
-        self.mesh.fill(e, face)
+        let around = self.mesh.fill(e, face);
+        if !self.wedges.is_empty() {
+            self.wedges.adopt_face(&self.mesh, face);
+        }
+        around
     }
 
     /// Gives a face that was dead what `beside` carries.
@@ -337,11 +382,17 @@ impl<S: EdgeStore> Surface<S> {
         if let Some(double) = self.double_sided.get_mut(face.index()) {
             *double = false;
         }
+        if !self.wedges.groups.is_empty() {
+            self.wedges.groups[face.index()] = self.wedges.groups[beside.index()];
+        }
     }
 
     /// Flips `e`, with the creases around it.
     pub fn flip(&mut self, e: EdgeId) {
         let sides = self.mesh.flip(e);
+        if !self.wedges.is_empty() {
+            self.wedges.flip(&self.mesh, e, &sides);
+        }
         if !self.creases.is_empty() {
             let creased = sides.map(|(old, _)| self.creases[old.index()]);
             for ((_, new), creased) in sides.into_iter().zip(creased) {
@@ -406,6 +457,7 @@ impl<S: EdgeStore> Surface<S> {
             + self.seam.capacity()
             + self.double_sided.capacity()
             + self.creases.capacity()
+            + self.wedges.bytes()
             + (self.weights.capacity() + self.deviation.capacity()) * size_of::<f32>()
     }
 }

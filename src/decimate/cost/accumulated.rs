@@ -1,9 +1,10 @@
 //! The *fast* cost: quadrics of the original's planes, added up (Garland & Heckbert 1997), with
 //! area weights and boundary lines.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use wide::f32x4;
 
+use super::attributes::{AttributeForms, carried};
 use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, doubles, each,
@@ -13,6 +14,7 @@ use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
+use crate::decimate::wedges::Carried;
 use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, VertexId};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
@@ -50,12 +52,14 @@ impl Quadric {
 const AS_GOOD: f64 = 1e-6;
 
 /// Where the energy of two quadrics' vertices is least, `along` the edge from the first to the second.
+/// `add` adds what is not of planes and lines.
 #[inline(always)]
 fn least<T: Number>(
     at_v: &[T; 10],
     at_w: &[T; 10],
     along: [T; 3],
     placement: Placement,
+    add: impl FnOnce(&mut Form<T>),
 ) -> Least<T> {
     let [xx, xy, xz, yy, yz, zz, bx, by, bz, c_v] = *at_v;
     let (a_v, b_v) = ([xx, xy, xz, yy, yz, zz], [bx, by, bz]);
@@ -65,6 +69,7 @@ fn least<T: Number>(
     form.b = plus(&form.b, &plus(&b_v, &b_w));
     let b_along = dot(&b_w, &form.along);
     form.at_tail = form.at_tail + (b_along + b_along) + (c_v + c_w);
+    add(&mut form);
     let as_good = match placement {
         Placement::Optimal => AS_GOOD,
         // Nothing is better than the better end.
@@ -76,6 +81,7 @@ fn least<T: Number>(
 /// The accumulated cost.
 pub struct Accumulated {
     quadrics: Vec<Quadric>,
+    attributes: Option<AttributeForms>,
     placement: Placement,
 }
 
@@ -167,13 +173,15 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         }
         Self {
             quadrics,
+            attributes: AttributeForms::new(surface),
             placement: options.placement,
         }
     }
 
-    fn with_states(_: &Surface<S>, options: &Options, states: Vec<Quadric>) -> Self {
+    fn with_states(surface: &Surface<S>, options: &Options, states: Vec<Quadric>) -> Self {
         Self {
             quadrics: states,
+            attributes: AttributeForms::new(surface),
             placement: options.placement,
         }
     }
@@ -203,19 +211,39 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         let along = surface.geometry.between(v, w).to_array();
         let at_v = doubles(&self.quadrics[v.index()].0);
         let at_w = doubles(&self.quadrics[w.index()].0);
-        let least = least(&at_v, &at_w, along, self.placement);
+        let least = least(&at_v, &at_w, along, self.placement, |form| {
+            if let Some(attributes) = &self.attributes {
+                attributes.add_to(form, surface, e);
+            }
+        });
         least.evaluation(surface, [v, w], held, self.placement)
     }
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
+        if self.attributes.is_some() {
+            return edges.map(|e| {
+                let evaluation = self.evaluate(surface, e, [false; 2]);
+                evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
+            });
+        }
         let tails = each(*edges, |e| surface.mesh.tail(e));
         let heads = each(*edges, |e| surface.mesh.head(e));
         let scale = f32x4::splat(surface.geometry.scale() as f32);
         let along = between(&places(surface, tails), &places(surface, heads), scale);
         let (at_tail, at_head) = (self.numbers(tails), self.numbers(heads));
-        let least = least(&at_tail, &at_head, along, self.placement);
+        let least = least(&at_tail, &at_head, along, self.placement, |_| {});
         least.costs().to_array()
+    }
+
+    fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried {
+        carried(
+            self.attributes.as_ref(),
+            surface,
+            e,
+            self.placement,
+            position,
+        )
     }
 
     fn after_collapse(
@@ -230,11 +258,20 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         let (a2, b2, c2) = self.quadrics[kept.index()].seen_from(moved[1]);
         self.quadrics[kept.index()] = Quadric::new(a.plus(a2), b + b2, (c + c2).max(0.0));
         changed.clear();
+        if let Some(attributes) = &mut self.attributes {
+            changed.push(kept);
+            changed.extend(surface.mesh.neighbours(kept));
+            changed.extend(&merged.around);
+            changed.sort_unstable();
+            changed.dedup();
+            attributes.update(surface, changed);
+            changed.clear();
+        }
     }
 
     fn after_change(
         &mut self,
-        _: &Surface<S>,
+        surface: &Surface<S>,
         cut: [[VertexId; 2]; 3],
         changed: &mut Vec<VertexId>,
     ) {
@@ -242,6 +279,15 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
             self.quadrics[new.index()] = self.quadrics[old.index()];
         }
         changed.clear();
+        if let Some(attributes) = &mut self.attributes {
+            changed.extend(cut.as_flattened());
+            let around = cut.as_flattened().iter();
+            changed.extend(around.flat_map(|&v| surface.mesh.neighbours(v)));
+            changed.sort_unstable();
+            changed.dedup();
+            attributes.update(surface, changed);
+            changed.clear();
+        }
         changed.extend(cut.as_flattened());
     }
 
@@ -254,6 +300,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     }
 
     fn bytes(&self) -> usize {
-        self.quadrics.capacity() * size_of::<Quadric>()
+        let attributes = self.attributes.as_ref().map_or(0, AttributeForms::bytes);
+        self.quadrics.capacity() * size_of::<Quadric>() + attributes
     }
 }

@@ -4,15 +4,17 @@
 //! original, so it works on any intermediate mesh. A volume constraint keeps the surface from
 //! shrinking.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::attributes::{AttributeForms, carried};
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
 use super::{Cost, Evaluation, LANES, between, boundary_weight, doubles, each, part, places};
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
+use crate::decimate::wedges::Carried;
 use crate::mesh::{EdgeId, EdgeStore, Opposite, VertexId};
 
 /// The squared length that the sum of a star's normals must have for the volume constraint to say
@@ -94,6 +96,7 @@ const SINGLE: Precision = Precision {
 /// The memoryless, volume-constrained cost.
 pub struct Memoryless {
     tensors: Vec<Tensor>,
+    attributes: Option<AttributeForms>,
     boundary_weight: f64,
     placement: Placement,
     exact_below: usize,
@@ -129,7 +132,7 @@ fn numbers(tensors: [&Tensor; LANES]) -> [Lanes; 9] {
 /// Where an edge's energy is least among the places that keep the volume.
 ///
 /// `dying` is the sum of the normals of the faces at the edge, nothing where the edge encloses no
-/// one volume; `weight` the larger of the ends' weights.
+/// one volume; `weight` the larger of the ends' weights. `add` adds what is not of planes and lines.
 #[inline(always)]
 fn least<T: Number>(
     at_v: &[T; 9],
@@ -138,12 +141,14 @@ fn least<T: Number>(
     dying: Option<Vector<T>>,
     weight: T,
     precision: Precision,
+    add: impl FnOnce(&mut Form<T>),
 ) -> Least<T> {
     let [xx, xy, xz, yy, yz, zz, x, y, z] = *at_v;
     let (quadratic_v, area_v) = ([xx, xy, xz, yy, yz, zz], [x, y, z]);
     let [xx, xy, xz, yy, yz, zz, x, y, z] = *at_w;
     let (quadratic_w, area_w) = ([xx, xy, xz, yy, yz, zz], [x, y, z]);
-    let form = Form::of_ends(&quadratic_v, &quadratic_w, along);
+    let mut form = Form::of_ends(&quadratic_v, &quadratic_w, along);
+    add(&mut form);
     let trace = form.trace();
     let factor = Factor::of(&form.m, T::splat(precision.ridge) * trace);
     let x = factor.solve(&form.b);
@@ -171,6 +176,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         let slots = surface.mesh.vertex_slots();
         let mut model = Self {
             tensors: Vec::new(),
+            attributes: AttributeForms::new(surface),
             boundary_weight: boundary_weight(options.boundary),
             exact_below: if surface.seam.is_empty() {
                 EXACT_BELOW
@@ -220,7 +226,11 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         });
         let [weight_v, weight_w] = ends.map(|v| surface.weight(v));
         let weight = weight_v.max(weight_w);
-        let least = least(&at_v, &at_w, along, dying, weight, DOUBLE);
+        let least = least(&at_v, &at_w, along, dying, weight, DOUBLE, |form| {
+            if let Some(attributes) = &self.attributes {
+                attributes.add_to(form, surface, e);
+            }
+        });
         least.evaluation(surface, ends, held, self.placement)
     }
 
@@ -238,7 +248,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         };
         let any_is_heavy =
             |tensors: [&Tensor; LANES]| tensors.iter().fold(false, |any, t| any | t.is_heavy());
-        if any_is_heavy(at_tails) | any_is_heavy(at_heads) {
+        if any_is_heavy(at_tails) | any_is_heavy(at_heads) | self.attributes.is_some() {
             return one_by_one();
         }
         let [a, b, c, d] = *edges;
@@ -271,9 +281,19 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
                 ..SINGLE
             },
         };
-        least(&at_v, &at_w, along, dying, weight, precision)
+        least(&at_v, &at_w, along, dying, weight, precision, |_| {})
             .costs()
             .to_array()
+    }
+
+    fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried {
+        carried(
+            self.attributes.as_ref(),
+            surface,
+            e,
+            self.placement,
+            position,
+        )
     }
 
     fn after_collapse(
@@ -298,6 +318,9 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             tensor.left -= u16::from(lags);
             !lags
         });
+        if let Some(attributes) = &mut self.attributes {
+            attributes.update(surface, changed);
+        }
         let is_exact = surface.mesh.face_count() < self.exact_below;
         let mut listed = 0;
         for first in (0..changed.len()).step_by(LANES) {
@@ -328,6 +351,9 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         changed.extend(around.flat_map(|&v| surface.mesh.neighbours(v)));
         changed.sort_unstable();
         changed.dedup();
+        if let Some(attributes) = &mut self.attributes {
+            attributes.update(surface, changed);
+        }
         for four in changed.chunks(LANES) {
             let now = self.tensors(surface, four);
             for (x, tensor) in four.iter().zip(now) {
@@ -345,7 +371,8 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
     }
 
     fn bytes(&self) -> usize {
-        self.tensors.capacity() * size_of::<Tensor>()
+        let attributes = self.attributes.as_ref().map_or(0, AttributeForms::bytes);
+        self.tensors.capacity() * size_of::<Tensor>() + attributes
     }
 }
 

@@ -3,11 +3,13 @@
 //! Costs are squared distances times areas, in the unit box.
 
 mod accumulated;
+mod attributes;
 mod form;
 mod memoryless;
 mod star;
 
 pub use accumulated::Accumulated;
+pub use attributes::AttributeForms;
 pub use form::{LANES, cross, dot, minus};
 use form::{Lanes, Least, Vector};
 pub use memoryless::Memoryless;
@@ -17,6 +19,7 @@ use glam::{DVec3, Vec3};
 use super::options::{Boundary, Options, Placement};
 use super::queue::Queue;
 use super::surface::{Merged, Surface};
+use super::wedges::Carried;
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
 
 /// A collapse's cost, in the unit box, and where its vertex goes.
@@ -64,6 +67,10 @@ pub trait Cost<S: EdgeStore>: Send + Sync {
     /// What the collapses of edges of which no end is held cost, about as
     /// [`evaluate`](Self::evaluate) says; not finite where it says nothing.
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES];
+
+    /// The wedges of the vertex that is left of `e` if it goes to `position`; none where nothing is
+    /// carried by corners.
+    fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried;
 
     /// Brings the state up to date after a collapse, and lists the vertices whose edges cost
     /// something else now.
@@ -217,6 +224,7 @@ mod tests {
             turned: Vec::new(),
             creases: Vec::new(),
             weights: Vec::new(),
+            wedges: Default::default(),
             seam: Vec::new(),
             lost: 0.0,
         }

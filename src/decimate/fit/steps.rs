@@ -590,6 +590,10 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
             && before.largest > f64::from(self.original.noise_squared)
             && after.is_better(&before, gain, self.allowed)
             && self.surface.mesh.flip_condition(e)
+            && self
+                .surface
+                .wedges
+                .flip_keeps_charts(&self.surface.mesh, e, o)
             && self.flip_is_better(faces, &old, &new, gain, before, after);
         if is_better {
             self.surface.flip(e);
