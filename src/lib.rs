@@ -37,6 +37,7 @@ pub mod io;
 pub mod mesh;
 pub mod metrics;
 pub mod nearest;
+pub mod progress;
 pub mod repair;
 #[cfg(test)]
 mod shapes;

@@ -10,13 +10,14 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 11] = [
-    ("error", &[]),
+const ARROWS: [(&str, &[&str]); 12] = [
+    ("progress", &[]),
+    ("error", &["progress"]),
     ("indexed_mesh", &["error"]),
-    ("mesh", &[]),
+    ("mesh", &["progress"]),
     ("nearest", &[]),
-    ("spatial", &[]),
-    ("clean", &["error", "indexed_mesh", "spatial"]),
+    ("spatial", &["progress"]),
+    ("clean", &["error", "indexed_mesh", "progress", "spatial"]),
     ("io", &["error", "indexed_mesh"]),
     (
         "decimate",
@@ -26,6 +27,7 @@ const ARROWS: [(&str, &[&str]); 11] = [
             "clean",
             "mesh",
             "nearest",
+            "progress",
             "spatial",
         ],
     ),
