@@ -1,7 +1,7 @@
 //! How far work has come, told to whoever asked, who may cancel it.
 //!
 //! Who asks hands down one function. It is called on the thread that it came from, never from
-//! another one, about every [`EVERY`] triangles of work and where a stage begins. What it is told
+//! another one, about every 65 000 triangles of work and where a stage begins. What it is told
 //! depends on the mesh, the options and the number of threads alone, not on time.
 
 use std::ops::ControlFlow;

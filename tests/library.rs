@@ -1,6 +1,7 @@
 //! The library as another program meets it: what it may send between threads, stop and get wrong.
 
 use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
 use decimate::clean::{Cleaning, clean};
 use decimate::decimate::{
@@ -258,6 +259,58 @@ fn detours_are_told_of_and_can_be_cancelled() {
             assert!(is_cancelled, "{what}, call {last}: {result:?}");
         }
     }
+}
+
+/// On a mesh of a million triangles and one thread a call comes every 0.1 s, whatever is done. Asks a
+/// clock, so only when it is asked for, on a machine that does nothing else:
+///
+///     cargo test --release --test library -- --ignored --nocapture every_tenth
+#[test]
+#[ignore = "asks a clock"]
+fn a_call_comes_every_tenth_of_a_second() {
+    let original = torus(710);
+    let mut longest_of_all = Duration::ZERO;
+    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+        for chunks in [Chunks::Auto, Chunks::Off] {
+            for ratio in [0.001, 0.1, 0.9] {
+                let options = Options {
+                    targets: Targets {
+                        ratio: Some(ratio),
+                        ..Targets::default()
+                    },
+                    quality,
+                    chunks,
+                    ..Options::default()
+                };
+                let mesh = original.clone();
+                let run = || {
+                    let start = Instant::now();
+                    let (mut last, mut longest) = (start, (Duration::ZERO, Stage::Clean, 0.0));
+                    let mut calls = 0;
+                    let mut stage_before = Stage::Clean;
+                    let mut follow = |progress: Progress| {
+                        calls += 1;
+                        let now = Instant::now();
+                        if now - last > longest.0 {
+                            longest = (now - last, stage_before, progress.fraction);
+                        }
+                        (last, stage_before) = (now, progress.stage);
+                        ControlFlow::Continue(())
+                    };
+                    decimate_with_progress(mesh, &options, &mut follow).unwrap();
+                    (calls, longest, start.elapsed())
+                };
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+                let (calls, longest, all) = pool.build().unwrap().install(run);
+                println!("{quality:?} {chunks:?} {ratio}: {calls} calls in {all:?}, {longest:?}");
+                longest_of_all = longest_of_all.max(longest.0);
+            }
+        }
+    }
+    assert!(
+        longest_of_all < Duration::from_millis(100),
+        "{longest_of_all:?}"
+    );
 }
 
 /// Cancelled before anything is done, even with a mesh that would be refused; options are looked at

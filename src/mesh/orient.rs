@@ -5,6 +5,7 @@ use super::{EdgeId, EdgeStore, FaceId, Mesh};
 use crate::progress::{self, Meter, unheard};
 
 /// A mesh whose faces agree with their neighbours where they can.
+#[non_exhaustive]
 pub struct Oriented<S> {
     /// The connectivity.
     pub mesh: Mesh<S>,
