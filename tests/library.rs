@@ -318,7 +318,14 @@ fn a_call_comes_every_tenth_of_a_second() {
 #[test]
 fn what_is_wrong_with_options_is_said_before_the_first_call() {
     let empty = IndexedMesh::default();
-    let (calls, result) = told(&empty, &Options::default(), Some(1));
+    let half = Options {
+        targets: Targets {
+            ratio: Some(0.5),
+            ..Targets::default()
+        },
+        ..Options::default()
+    };
+    let (calls, result) = told(&empty, &half, Some(1));
     assert!(matches!(result, Err(Error::Cancelled)) && calls.len() == 1);
     assert!(calls[0].stage == Stage::Clean && calls[0].fraction == 0.0);
     let options = Options {
