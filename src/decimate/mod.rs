@@ -58,8 +58,7 @@ pub fn decimate(mesh: IndexedMesh, options: &Options) -> Result<(IndexedMesh, Re
 ///
 /// It is called on this thread: where each [stage](Stage) begins, after about every 65 000 triangles
 /// that a thread has visited or 3000 that it has removed (0.1 s at the most, on a mesh of a million
-/// triangles), and once when all is done. Under [`Options::check`] it is called at each collapse.
-/// The result does not depend on it.
+/// triangles), and once when all is done. The result does not depend on it.
 ///
 /// ```
 /// use std::ops::ControlFlow;
