@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::indexed_mesh::{IndexedMesh, Parts};
+use crate::progress::{self, Meter, unheard};
 use crate::spatial::Grid;
 
 /// What cleaning found and did.
@@ -31,7 +32,7 @@ pub struct Cleaning {
     pub kept_faces: usize,
 }
 
-/// Elements that a task of a parallel pass takes.
+/// Elements that a task of a parallel pass takes, and that are visited between two words about it.
 const BLOCK: usize = 1 << 14;
 
 /// The mesh as a simplicial complex: no repeated vertex in a face, no face twice, every vertex used
@@ -45,16 +46,25 @@ const BLOCK: usize = 1 << 14;
 /// # Errors
 /// None today.
 pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
+    Ok(unheard(|meter| clean_with(mesh, weld, meter)))
+}
+
+/// [`clean`], told to a meter: 3 units a vertex and a triangle, more where many have twins.
+pub(crate) fn clean_with(
+    mesh: IndexedMesh,
+    weld: bool,
+    meter: &mut Meter,
+) -> progress::Result<(IndexedMesh, Cleaning)> {
     let mut counts = Cleaning::default();
     let mut parts = mesh.into_parts();
     if weld {
-        counts.welded_vertices = weld_positions(&mut parts);
+        counts.welded_vertices = weld_positions(&mut parts, meter)?;
         if counts.welded_vertices > 0 {
             parts.attributes.merge_equal_wedges(&parts.triangles);
         }
     }
-    let mut faces = Faces::sift(&parts, &mut counts);
-    faces.fold_duplicates(&mut parts, &mut counts);
+    let mut faces = Faces::sift(&parts, &mut counts, meter)?;
+    faces.fold_duplicates(&mut parts, &mut counts, meter)?;
     let Faces { keep, used, .. } = faces;
     if !keep.is_empty() {
         retain(&keep, &mut parts.triangles);
@@ -63,9 +73,11 @@ pub fn clean(mesh: IndexedMesh, weld: bool) -> Result<(IndexedMesh, Cleaning)> {
         parts.attributes.drop_unused_wedges();
     }
     let kept = used.iter().filter(|&&u| u).count();
+    meter.work(used.len())?;
     if kept < used.len() {
         counts.dropped_isolated_vertices = used.len() - kept - counts.welded_vertices;
         rename(&renumbered(&used), &mut parts.triangles);
+        meter.detour(parts.triangles.len())?;
         retain(&used, &mut parts.positions);
         retain(&used, &mut parts.weights);
     }
@@ -189,9 +201,9 @@ fn hash_of_face(t: [u32; 3]) -> u64 {
 
 /// Lets every triangle name the first vertex at each position, which takes the largest weight there,
 /// and returns how many others there were. Positions that are not finite are left alone.
-fn weld_positions(parts: &mut Parts) -> usize {
+fn weld_positions(parts: &mut Parts, meter: &mut Meter) -> progress::Result<usize> {
     let positions = &parts.positions[..];
-    let order = twins_in_order(positions);
+    let order = twins_in_order(positions, meter)?;
     let mut first: Vec<u32> = Vec::new();
     let mut welded = 0;
     let is_same = |&a: &u32, &b: &u32| positions[a as usize] == positions[b as usize];
@@ -204,9 +216,11 @@ fn weld_positions(parts: &mut Parts) -> usize {
         }
         same.iter().for_each(|&v| first[v as usize] = same[0]);
         welded += same.len() - 1;
+        meter.detour(same.len())?;
     }
     if welded > 0 {
         rename(&first, &mut parts.triangles);
+        meter.detour(parts.triangles.len())?;
         let weights = &mut parts.weights;
         // Where there are weights at all.
         for (v, &at_first) in first.iter().enumerate().take(weights.len()) {
@@ -214,14 +228,14 @@ fn weld_positions(parts: &mut Parts) -> usize {
             weights[at_first] = weights[at_first].max(weights[v]);
         }
     }
-    welded
+    Ok(welded)
 }
 
 /// Vertices, those with equal positions side by side, the first in front: all that have a twin, and
 /// some that have none.
 ///
 /// Sorted and not hashed, so that no crafted input takes quadratic time.
-fn twins_in_order(positions: &[Vec3]) -> Vec<u32> {
+fn twins_in_order(positions: &[Vec3], meter: &mut Meter) -> progress::Result<Vec<u32>> {
     // So many twins, as in a soup of triangles, are not worth being told apart.
     let many = positions.len() / 4;
     let mut sieve = Sieve::for_keys(positions.len());
@@ -229,16 +243,18 @@ fn twins_in_order(positions: &[Vec3]) -> Vec<u32> {
         block.iter().for_each(|&p| sieve.add(hash_of_position(p)));
         if sieve.repeats > many {
             drop(sieve);
-            return Grid::over(positions, 0.0).order(positions);
+            return Grid::over(positions, 0.0).order_with(positions, meter);
         }
+        meter.work(block.len())?;
     }
     let mut candidates = numbers_where(positions, |_, &p| sieve.may_repeat(hash_of_position(p)));
     drop(sieve);
+    meter.work(positions.len())?;
     sieve_again(&mut candidates, |v| hash_of_position(positions[v as usize]));
     let places: Vec<Vec3> = candidates.iter().map(|&v| positions[v as usize]).collect();
-    let mut order = Grid::over(&places, 0.0).order(&places);
+    let mut order = Grid::over(&places, 0.0).order_with(&places, meter)?;
     order.iter_mut().for_each(|i| *i = candidates[*i as usize]);
-    order
+    Ok(order)
 }
 
 /// What is known of the faces: which stay, which vertices they use, and which may have a twin.
@@ -251,7 +267,7 @@ struct Faces {
 
 impl Faces {
     /// Drops the faces with a coordinate that is not finite or a vertex twice.
-    fn sift(parts: &Parts, counts: &mut Cleaning) -> Self {
+    fn sift(parts: &Parts, counts: &mut Cleaning, meter: &mut Meter) -> progress::Result<Self> {
         let Parts {
             positions,
             triangles,
@@ -267,6 +283,9 @@ impl Faces {
             .par_chunks(BLOCK)
             .all(|block| block.iter().all(|p| p.is_finite()));
         for (i, &t) in triangles.iter().enumerate() {
+            if i % BLOCK == BLOCK - 1 {
+                meter.work(2 * BLOCK)?;
+            }
             let is_finite = all_finite || t.iter().all(|&v| positions[v as usize].is_finite());
             let is_proper = t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
             if is_finite && is_proper {
@@ -278,7 +297,7 @@ impl Faces {
                 faces.drop(i, triangles.len());
             }
         }
-        faces
+        Ok(faces)
     }
 
     /// Drops face `i` of so many.
@@ -291,7 +310,12 @@ impl Faces {
 
     /// Finds faces with the same three vertices among those kept. The first stays; the first that
     /// runs the other way is folded into it; the others are dropped. All use the same vertices.
-    fn fold_duplicates(&mut self, parts: &mut Parts, counts: &mut Cleaning) {
+    fn fold_duplicates(
+        &mut self,
+        parts: &mut Parts,
+        counts: &mut Cleaning,
+        meter: &mut Meter,
+    ) -> progress::Result<()> {
         let Parts {
             triangles,
             double_sided,
@@ -303,7 +327,9 @@ impl Faces {
             sieve.may_repeat(hash_of_face(t)) && (keep.is_empty() || keep[i])
         });
         self.sieve = Sieve::for_keys(0);
+        meter.work(triangles.len())?;
         sieve_again(&mut candidates, |i| hash_of_face(triangles[i as usize]));
+        meter.detour(2 * candidates.len())?;
 
         // The corner with the smallest id first; the direction of the other two is the face's.
         let turned = |i: u32| {
@@ -334,6 +360,7 @@ impl Faces {
             bucketed[*slot as usize] = i;
             *slot += 1;
         }
+        meter.detour(2 * candidates.len())?;
         drop(candidates);
         let mut bucket: Vec<([u32; 3], u32, bool)> = Vec::new();
         let mut begin = 0;
@@ -344,6 +371,7 @@ impl Faces {
             if members.len() < 2 {
                 continue;
             }
+            meter.detour(2 * members.len())?;
             bucket.clear();
             bucket.extend(members.iter().map(|&i| {
                 let [a, b, c] = turned(i);
@@ -371,6 +399,7 @@ impl Faces {
                 }
             }
         }
+        Ok(())
     }
 }
 

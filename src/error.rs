@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::progress::Cancelled;
+
 /// The result of everything here that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -54,6 +56,15 @@ pub enum Error {
     /// Options that contradict each other or lie outside their range.
     #[error("{0}")]
     InvalidOptions(String),
+    /// Whoever [followed](crate::progress) the work cancelled it. Nothing came of it.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl From<Cancelled> for Error {
+    fn from(Cancelled: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// A place in a file. Written right behind the file's name.

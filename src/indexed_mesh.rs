@@ -30,6 +30,7 @@ pub struct IndexedMesh {
 
 /// A mesh taken apart.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Parts {
     /// [`IndexedMesh::origin`].
     pub origin: DVec3,

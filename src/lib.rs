@@ -21,8 +21,8 @@
 //! complex of it, [`decimate`] turns it into another over a [`mesh::Mesh`] in one of three memory
 //! tiers, [`io`] writes it, [`metrics`] says what is in it, [`repair`] makes it manifold. [`spatial`]
 //! puts positions in an order in which neighbours stand together. [`attributes`] are what a mesh
-//! carries beside positions. [`structures`] holds the mesh
-//! structures that the paper compares, for comparison and teaching.
+//! carries beside positions. [`structures`] holds the mesh structures that the paper compares, for
+//! comparison and teaching. [`progress`] says how far a decimation is, which whoever asks may cancel.
 //!
 //! # Limits
 //! At most 2³¹−1 directed edges (715 million triangles) and 2³¹−1 vertices. Coordinates are single
@@ -39,6 +39,7 @@ pub mod io;
 pub mod mesh;
 pub mod metrics;
 pub mod nearest;
+pub mod progress;
 pub mod repair;
 #[cfg(test)]
 mod shapes;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
-use decimate::decimate::{Progress, decimate_with_progress, peak_rss_bytes};
+use decimate::decimate::{decimate_with_progress, peak_rss_bytes};
 use decimate::error::Error;
 use decimate::io::{self, Format, ReadOptions, WriteOptions};
 use decimate::metrics::{CompareOptions, Reference, info, info_of_file};
@@ -78,19 +78,22 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
         vertex_weight: args.vertex_weight.clone(),
         attributes: args.attributes != cli::AttributesArg::Ignore,
     };
+    let bar = progress_bar(args.quiet);
+    bar.set_message("reading");
     let mesh = io::read(input, &read_options)?;
     let read_seconds = start.elapsed().as_secs_f64();
 
-    let bar = progress_bar(args.quiet);
     let (mesh, mut report) = decimate_with_progress(mesh, &options, &mut |progress| {
-        advance(&bar, progress);
+        bar.set_message(progress.stage.name());
+        bar.set_position((progress.fraction * BAR_STEPS as f64) as u64);
         ControlFlow::Continue(())
     })
     .map_err(|error| name_mesh(error, input))?;
-    bar.finish_and_clear();
 
     let start = Instant::now();
+    bar.set_message("writing");
     io::write(output, &mesh, &write_options)?;
+    bar.finish_and_clear();
     report.read_seconds = read_seconds;
     report.write_seconds = start.elapsed().as_secs_f64();
     report.peak_heap_bytes = Some(HEAP.peak_usage() as u64);
@@ -282,21 +285,19 @@ fn name_mesh(error: Error, input: &Path) -> Error {
     }
 }
 
+/// The steps of a full bar: a tenth of a percent.
+const BAR_STEPS: u64 = 1000;
+
+/// Where a terminal shows it, a bar with the stage at work.
 fn progress_bar(quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let bar = ProgressBar::new(0);
-    let style =
-        "{bar:40} {percent:>3}%  {human_pos}/{human_len} triangles removed, {per_sec}, {eta} left";
+    let bar = ProgressBar::new(BAR_STEPS);
+    let style = "{bar:40} {percent:>3}%  {msg}, {elapsed}, {eta} left";
     bar.set_style(ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar()));
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
-}
-
-fn advance(bar: &ProgressBar, progress: Progress) {
-    bar.set_length((progress.triangles_start - progress.triangles_target) as u64);
-    bar.set_position((progress.triangles_start - progress.triangles) as u64);
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {

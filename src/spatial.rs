@@ -3,6 +3,8 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::progress::{self, Meter, unheard};
+
 /// A grid of 1024³ cubic cells over the box of some positions, numbered in Morton order (Morton
 /// 1966): the bits of the three cell coordinates take turns in the code, so that every cube of
 /// 2^k cells a side, at a multiple of 2^k, is one range of codes.
@@ -96,24 +98,40 @@ impl Grid {
     /// Takes 16 bytes a position while it runs, linear time, and O(n log n) for n positions in one
     /// cell. The order does not depend on the number of threads.
     pub fn order(&self, positions: &[Vec3]) -> Vec<u32> {
-        let places = self.places(positions);
-        places.into_par_iter().map(id).with_min_len(BLOCK).collect()
+        unheard(|meter| self.order_with(positions, meter))
     }
 
-    /// The [codes](Self::code) of the positions and their ids, in the [order](Self::order).
-    pub fn sorted(&self, positions: &[Vec3]) -> impl Iterator<Item = (u32, u32)> + use<> {
-        let places = self.places(positions);
-        places.into_iter().map(|place| (code(place), id(place)))
+    /// [`order`](Self::order), told to a meter: 4 units a position.
+    pub(crate) fn order_with(
+        &self,
+        positions: &[Vec3],
+        meter: &mut Meter,
+    ) -> progress::Result<Vec<u32>> {
+        let places = self.places(positions, meter)?;
+        let ids = places.into_par_iter().map(id).with_min_len(BLOCK);
+        Ok(ids.collect())
     }
 
-    fn places(&self, positions: &[Vec3]) -> Vec<u64> {
+    /// The [codes](Self::code) of the positions and their ids, in the [order](Self::order); told to
+    /// a meter: 4 units a position.
+    pub(crate) fn sorted(
+        &self,
+        positions: &[Vec3],
+        meter: &mut Meter,
+    ) -> progress::Result<impl Iterator<Item = (u32, u32)> + use<>> {
+        let places = self.places(positions, meter)?;
+        Ok(places.into_iter().map(|place| (code(place), id(place))))
+    }
+
+    fn places(&self, positions: &[Vec3], meter: &mut Meter) -> progress::Result<Vec<u64>> {
         let numbered = (0..positions.len() as u32).into_par_iter();
         let mut places: Vec<u64> = numbered
             .with_min_len(BLOCK)
             .map(|v| place(self.code(positions[v as usize]), v))
             .collect();
-        sort_places(&mut places, positions);
-        places
+        meter.work(positions.len())?;
+        sort_places(&mut places, positions, meter)?;
+        Ok(places)
     }
 }
 
@@ -142,9 +160,14 @@ fn spread(x: u32) -> u32 {
 ///
 /// A radix sort of our own, since it may rely on 30-bit codes and ids in order: one pass deals out
 /// by the highest ten bits, and each bucket then is sorted in the cache, on any thread.
-fn sort_places(places: &mut Vec<u64>, positions: &[Vec3]) {
+fn sort_places(
+    places: &mut Vec<u64>,
+    positions: &[Vec3],
+    meter: &mut Meter,
+) -> progress::Result<()> {
     let mut buckets = vec![0u64; places.len()];
     let ends = deal(places, &mut buckets, 2 * AXIS_BITS);
+    meter.work(places.len())?;
     let mut tasks = Vec::new();
     let (mut bucket_rest, mut spare_rest) = (&mut buckets[..], &mut places[..]);
     let mut begin = 0;
@@ -158,7 +181,7 @@ fn sort_places(places: &mut Vec<u64>, positions: &[Vec3]) {
             tasks.push((bucket, spare));
         }
     }
-    tasks.into_par_iter().for_each(|(bucket, spare)| {
+    let sort = |(bucket, spare): &mut (&mut [u64], &mut [u64])| {
         if bucket.len() < SHORT {
             bucket.sort_unstable();
         } else {
@@ -179,9 +202,26 @@ fn sort_places(places: &mut Vec<u64>, positions: &[Vec3]) {
                 cell.par_sort_unstable_by_key(key);
             }
         }
-    });
+    };
+    let mut tasks = &mut tasks[..];
+    while !tasks.is_empty() {
+        let mut sum = 0;
+        let fits = |task: &&(&mut [u64], &mut [u64])| {
+            let fits = sum < AT_A_TIME;
+            sum += task.0.len();
+            fits
+        };
+        let (now, later) = tasks.split_at_mut(tasks.iter().take_while(fits).count());
+        now.par_iter_mut().for_each(sort);
+        meter.work(2 * now.iter().map(|task| task.0.len()).sum::<usize>())?;
+        tasks = later;
+    }
     *places = buckets;
+    Ok(())
 }
+
+/// The places that are sorted between two words about it, at least.
+const AT_A_TIME: usize = 1 << 19;
 
 /// Below this many places comparing is cbucketer than two deals over 1024 counts (measured).
 const SHORT: usize = 256;

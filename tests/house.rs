@@ -10,14 +10,15 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Every room, and the rooms that it may use beside itself. `main`, `cli` and `text` are the command, over
 /// the library: they may use everything.
-const ARROWS: [(&str, &[&str]); 12] = [
-    ("error", &[]),
+const ARROWS: [(&str, &[&str]); 13] = [
+    ("progress", &[]),
+    ("error", &["progress"]),
     ("attributes", &["error"]),
     ("indexed_mesh", &["error", "attributes"]),
-    ("mesh", &[]),
+    ("mesh", &["progress"]),
     ("nearest", &[]),
-    ("spatial", &[]),
-    ("clean", &["error", "indexed_mesh", "spatial"]),
+    ("spatial", &["progress"]),
+    ("clean", &["error", "indexed_mesh", "progress", "spatial"]),
     ("io", &["error", "attributes", "indexed_mesh"]),
     (
         "decimate",
@@ -28,6 +29,7 @@ const ARROWS: [(&str, &[&str]); 12] = [
             "clean",
             "mesh",
             "nearest",
+            "progress",
             "spatial",
         ],
     ),

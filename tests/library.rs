@@ -1,11 +1,12 @@
 //! The library as another program meets it: what it may send between threads, stop and get wrong.
 
 use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
 use decimate::clean::{Cleaning, clean};
 use decimate::decimate::{
-    Boundary, Chunks, Options, Placement, Progress, Quality, Report, StopReason, Targets,
-    TierChoice, Topology, decimate, decimate_with_progress,
+    Boundary, Chunks, Options, Placement, Quality, Report, StopReason, Targets, TierChoice,
+    Topology, decimate, decimate_with_progress,
 };
 use decimate::error::{Error, Place};
 use decimate::indexed_mesh::{IndexedMesh, MeshBuilder, Parts, PolygonMesh};
@@ -15,6 +16,7 @@ use decimate::mesh::{
 };
 use decimate::metrics::{CompareOptions, Comparison, Info, Reference, info};
 use decimate::nearest::{Nearest, Triangles};
+use decimate::progress::{Progress, Stage};
 use decimate::repair::CutReport;
 use decimate::spatial::Grid;
 use decimate::structures::{Measured, measure, measure_quads};
@@ -52,7 +54,7 @@ fn what_is_public_may_be_sent_and_shared() {
     holds::<Cleaning>();
     holds::<Options>();
     holds::<Report>();
-    holds::<Progress>();
+    holds::<(Progress, Stage)>();
     holds::<ReadOptions>();
     holds::<WriteOptions>();
     holds::<Format>();
@@ -85,21 +87,54 @@ fn assert_is_torus(mesh: &IndexedMesh, what: &str) {
         .unwrap_or_else(|wrong| panic!("{what}: {wrong}"));
 }
 
-/// Whichever call is the one that breaks, in chunks or behind them or without, for every quality and
-/// tier: no further call comes, the reason is given, and the mesh is whole.
+/// What is told of a run, up to and with the call that cancels it, if one does.
+fn told(
+    mesh: &IndexedMesh,
+    options: &Options,
+    last: Option<usize>,
+) -> (Vec<Progress>, Result<(IndexedMesh, Report), Error>) {
+    let mut calls = Vec::new();
+    let caller = std::thread::current().id();
+    let mut follow = |progress: Progress| {
+        assert_eq!(std::thread::current().id(), caller);
+        calls.push(progress);
+        if Some(calls.len()) == last {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let result = decimate_with_progress(mesh.clone(), options, &mut follow);
+    (calls, result)
+}
+
+/// Asks that a run is told of evenly, and returns its stages, each once where it follows itself.
+fn stages_of(calls: &[Progress], what: &str) -> Vec<Stage> {
+    let fractions: Vec<f64> = calls.iter().map(|p| p.fraction).collect();
+    assert!(fractions.is_sorted(), "{what}: {fractions:?}");
+    assert!(fractions[0] >= 0.0, "{what}");
+    let (last, before) = fractions.split_last().unwrap();
+    assert!(*last == 1.0 && before.iter().all(|&f| f < 1.0), "{what}");
+    let mut stages: Vec<Stage> = calls.iter().map(|p| p.stage).collect();
+    stages.dedup();
+    stages
+}
+
+/// In every quality and tier, in chunks and without: the stages come in order, none is silent for
+/// long, and whichever call cancels is the last of the same calls. The bytes are as without.
 #[test]
-fn cancelling_at_any_call_gives_a_whole_mesh() {
-    let original = torus(60);
-    let mut stages = Vec::new();
+fn every_stage_tells_how_far_it_is_and_can_be_cancelled() {
+    use Stage::{Assemble, Build, Chunks as InChunks, Clean, Collapse, Fit};
+    let original = torus(100);
     for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
         for (chunks, tier) in [
             (Chunks::Off, Tier::Full),
-            (Chunks::Triangles(800), Tier::Medium),
-            (Chunks::Triangles(800), Tier::Small),
+            (Chunks::Triangles(1500), Tier::Small),
         ] {
+            let what = format!("{quality:?} {chunks:?} {tier:?}");
             let options = Options {
                 targets: Targets {
-                    triangles: Some(400),
+                    triangles: Some(1000),
                     ..Targets::default()
                 },
                 quality,
@@ -107,45 +142,201 @@ fn cancelling_at_any_call_gives_a_whole_mesh() {
                 tier: TierChoice::Fixed(tier),
                 ..Options::default()
             };
-            for last in 1.. {
-                let what = format!("{quality:?} {chunks:?} {tier:?}, call {last}");
-                let mut calls = 0;
-                let mut left = original.triangle_count();
-                let mut on = |progress: Progress| {
-                    calls += 1;
-                    assert_eq!(progress.triangles_start, 7200);
-                    assert_eq!(progress.triangles_target, 400);
-                    assert!(progress.triangles <= left, "{what}: more than before");
-                    left = progress.triangles;
-                    if calls == last {
-                        ControlFlow::Break(())
-                    } else {
-                        ControlFlow::Continue(())
-                    }
-                };
-                let (mesh, report) =
-                    decimate_with_progress(original.clone(), &options, &mut on).unwrap();
-                assert_is_torus(&mesh, &what);
-                assert_eq!(mesh.triangle_count(), report.triangles_out, "{what}");
-                if calls < last {
-                    assert_eq!(report.stop_reason, StopReason::Target, "{what}");
-                    break;
-                }
-                assert_eq!(calls, last, "{what}: called again after it broke");
-                assert_eq!(report.stop_reason, StopReason::Cancelled, "{what}");
-                assert!(report.stopped_short && report.blocked.is_none(), "{what}");
-                assert!(report.triangles_out > 400, "{what}");
-                let is_before_the_whole = report.collapses_in_chunks == report.tally.collapses;
-                stages.push((chunks == Chunks::Off, is_before_the_whole));
+            let (calls, result) = told(&original, &options, None);
+            let (mesh, report) = result.unwrap();
+            let (unheard, _) = decimate(original.clone(), &options).unwrap();
+            assert!(mesh == unheard, "{what}");
+            assert_is_torus(&mesh, &what);
+            assert_eq!(report.stop_reason, StopReason::Target, "{what}");
+
+            let mut expected = vec![Clean, InChunks, Build, Collapse, Fit, Assemble];
+            expected.retain(|&stage| match stage {
+                InChunks => chunks != Chunks::Off,
+                Fit => quality == Quality::Best,
+                _ => true,
+            });
+            assert_eq!(stages_of(&calls, &what), expected);
+            // A call every 65 536 units: 20 000 triangles take 20 units each at least.
+            assert!(calls.len() > expected.len() + 5, "{what}: {calls:?}");
+            let jumps = calls
+                .windows(2)
+                .map(|pair| pair[1].fraction - pair[0].fraction);
+            let largest = jumps.fold(0.0, f64::max);
+            assert!(largest < 0.35, "{what}: {largest}, {calls:?}");
+
+            for last in 1..=calls.len() {
+                let (up_to_there, result) = told(&original, &options, Some(last));
+                assert_eq!(up_to_there, calls[..last], "{what}, call {last}");
+                let is_cancelled = matches!(result, Err(Error::Cancelled));
+                assert!(is_cancelled, "{what}, call {last}: {result:?}");
             }
         }
     }
-    for stage in [(true, false), (false, true)] {
-        assert!(
-            stages.contains(&stage),
-            "nothing was cancelled in {stage:?}: {stages:?}"
+}
+
+/// The detours are told of as well, and end as they do unheard: faces that disagree, creases, a locked
+/// boundary, a soup that is welded, a largest error, topology that may change, a check at every
+/// collapse, nothing left to collapse.
+#[test]
+fn detours_are_told_of_and_can_be_cancelled() {
+    let original = torus(40);
+    let ratio = |ratio| Targets {
+        ratio: Some(ratio),
+        ..Targets::default()
+    };
+    let in_chunks = Options {
+        targets: ratio(0.1),
+        chunks: Chunks::Triangles(400),
+        ..Options::default()
+    };
+    let with = |change: fn(&mut Options)| {
+        let mut options = in_chunks.clone();
+        change(&mut options);
+        options
+    };
+    let mut disagreeing = original.clone().into_parts();
+    disagreeing.triangles[1000..1400]
+        .iter_mut()
+        .for_each(|t| t.swap(1, 2));
+    let disagreeing = IndexedMesh::new(disagreeing.positions, disagreeing.triangles).unwrap();
+    let corners = original.triangles().as_flattened().iter();
+    let positions = corners.map(|&v| original.positions()[v as usize]).collect();
+    let soup = (0..original.triangles().len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
+    let soup = IndexedMesh::new(positions, soup.collect()).unwrap();
+    let cases = [
+        ("disagreeing", &disagreeing, in_chunks.clone()),
+        ("soup", &soup, in_chunks.clone()),
+        (
+            "creases",
+            &original,
+            with(|o| o.feature_angle_degrees = Some(20.0)),
+        ),
+        ("locked", &original, with(|o| o.boundary = Boundary::Lock)),
+        (
+            "simplified",
+            &original,
+            with(|o| o.topology = Topology::Simplify),
+        ),
+        ("checked", &original, with(|o| o.check = true)),
+        (
+            "largest error",
+            &original,
+            with(|o| {
+                o.quality = Quality::Best;
+                o.targets = Targets {
+                    max_error: Some(0.05),
+                    ..Targets::default()
+                };
+            }),
+        ),
+        (
+            "blocked",
+            &original,
+            with(|o| {
+                o.chunks = Chunks::Off;
+                o.targets.triangles = Some(0);
+                o.targets.ratio = None;
+            }),
+        ),
+    ];
+    for (what, mesh, options) in cases {
+        let (calls, result) = told(mesh, &options, None);
+        let (unheard, _) = decimate(mesh.clone(), &options).unwrap();
+        assert!(result.unwrap().0 == unheard, "{what}");
+        let stages = stages_of(&calls, what);
+        let builds = stages.iter().filter(|&&s| s == Stage::Build).count();
+        let is_built_before = ["disagreeing", "creases", "locked"].contains(&what);
+        assert_eq!(
+            builds,
+            1 + usize::from(is_built_before),
+            "{what}: {stages:?}"
         );
+        let most = if what == "checked" { 20 } else { calls.len() };
+        for last in 1..=most {
+            let (up_to_there, result) = told(mesh, &options, Some(last));
+            assert_eq!(up_to_there, calls[..last], "{what}, call {last}");
+            let is_cancelled = matches!(result, Err(Error::Cancelled));
+            assert!(is_cancelled, "{what}, call {last}: {result:?}");
+        }
     }
+}
+
+/// On a mesh of a million triangles and one thread a call comes every 0.1 s, whatever is done. Asks a
+/// clock, so only when it is asked for, on a machine that does nothing else:
+///
+///     cargo test --release --test library -- --ignored --nocapture every_tenth
+#[test]
+#[ignore = "asks a clock"]
+fn a_call_comes_every_tenth_of_a_second() {
+    let original = torus(710);
+    let mut longest_of_all = Duration::ZERO;
+    for quality in [Quality::Fast, Quality::Standard, Quality::Best] {
+        for chunks in [Chunks::Auto, Chunks::Off] {
+            for ratio in [0.001, 0.1, 0.9] {
+                let options = Options {
+                    targets: Targets {
+                        ratio: Some(ratio),
+                        ..Targets::default()
+                    },
+                    quality,
+                    chunks,
+                    ..Options::default()
+                };
+                let mesh = original.clone();
+                let run = || {
+                    let start = Instant::now();
+                    let (mut last, mut longest) = (start, (Duration::ZERO, Stage::Clean, 0.0));
+                    let mut calls = 0;
+                    let mut stage_before = Stage::Clean;
+                    let mut follow = |progress: Progress| {
+                        calls += 1;
+                        let now = Instant::now();
+                        if now - last > longest.0 {
+                            longest = (now - last, stage_before, progress.fraction);
+                        }
+                        (last, stage_before) = (now, progress.stage);
+                        ControlFlow::Continue(())
+                    };
+                    decimate_with_progress(mesh, &options, &mut follow).unwrap();
+                    (calls, longest, start.elapsed())
+                };
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+                let (calls, longest, all) = pool.build().unwrap().install(run);
+                println!("{quality:?} {chunks:?} {ratio}: {calls} calls in {all:?}, {longest:?}");
+                longest_of_all = longest_of_all.max(longest.0);
+            }
+        }
+    }
+    assert!(
+        longest_of_all < Duration::from_millis(100),
+        "{longest_of_all:?}"
+    );
+}
+
+/// Cancelled before anything is done, even with a mesh that would be refused; options are looked at
+/// first.
+#[test]
+fn what_is_wrong_with_options_is_said_before_the_first_call() {
+    let empty = IndexedMesh::default();
+    let half = Options {
+        targets: Targets {
+            ratio: Some(0.5),
+            ..Targets::default()
+        },
+        ..Options::default()
+    };
+    let (calls, result) = told(&empty, &half, Some(1));
+    assert!(matches!(result, Err(Error::Cancelled)) && calls.len() == 1);
+    assert!(calls[0].stage == Stage::Clean && calls[0].fraction == 0.0);
+    let options = Options {
+        targets: Targets {
+            ratio: Some(-1.0),
+            ..Targets::default()
+        },
+        ..Options::default()
+    };
+    let (calls, result) = told(&empty, &options, Some(1));
+    assert!(matches!(result, Err(Error::InvalidOptions(_))) && calls.is_empty());
 }
 
 /// Whatever the numbers in the options are: a mesh, or an error that says which is wrong.

@@ -10,7 +10,7 @@
 //! The cut depends on the mesh alone and the chunks do not know each other, so the result does not
 //! depend on the number of threads.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::cost::Cost;
 use super::cut::Cut;
 use super::flat::{FaceFlags, Flat};
-use super::greedy::{Greedy, Halt, Stop};
+use super::greedy::{EVALUATION, Greedy, Halt, Stop};
 use super::options::{Chunks, Options, Topology};
 use super::queue::Buckets;
 use super::report::Tally;
@@ -26,7 +26,8 @@ use super::surface::Surface;
 use super::wedges::FlatWedges;
 use crate::clean::{rename, renumbered, retain};
 use crate::error::Result;
-use crate::mesh::{EdgeStore, FaceId, Mesh, Outgoing, VertexId};
+use crate::mesh::{EdgeStore, FaceId, Mesh, Outgoing, VertexId, build};
+use crate::progress::{self, COLLAPSE, Meter, unheard};
 
 /// Below so many faces the whole mesh is as quick.
 const WORTHWHILE_FACES: usize = 50_000;
@@ -77,8 +78,19 @@ const BEGUN: f64 = 0.9;
 const HOPELESS: f32 = 32.0;
 const STUCK: f64 = 0.97;
 
-/// The chunks whose results wait to be counted, at most.
+/// The chunks whose results wait to be counted, at most, and of which each thread takes so many: a
+/// word about them comes every 100 000 triangles a thread.
 const BATCH: usize = 64;
+const BATCH_OF_THREAD: usize = 8;
+
+/// The work that a chunk takes beside its collapses, in units a face: it is gathered, built and
+/// evaluated.
+const BEGINNING: usize = 2 + build::UNITS + EVALUATION;
+/// And what a round takes for all: the cut, and putting together what is left.
+const ROUND: usize = 5;
+
+/// All rounds see about so many times the faces that there are at first.
+const ROUNDS: f64 = 1.3;
 
 /// The second round's grid lies this share of the box elsewhere.
 const SHIFT: f32 = 0.29;
@@ -139,7 +151,6 @@ pub struct Chunked<'a> {
     pub stop: Stop,
     /// The scale of the whole.
     pub scale: f64,
-    pub progress: &'a mut dyn FnMut(usize) -> ControlFlow<()>,
 }
 
 /// What decimation in chunks did.
@@ -154,8 +165,6 @@ pub struct Done {
     pub non_manifold_edges_in: usize,
     /// Whether nothing was done, since the faces do not agree with their neighbours.
     pub is_disoriented: bool,
-    /// Whether the caller asked to stop.
-    pub is_cancelled: bool,
 }
 
 impl Done {
@@ -180,22 +189,33 @@ impl Chunked<'_> {
         self.sizes(flat, self.left(flat)).is_some()
     }
 
+    /// The work that [`reduce`](Self::reduce) takes, about, in units.
+    pub fn work<V>(&self, flat: &Flat<V>) -> usize {
+        let faces = flat.triangle_count() as f64;
+        let seen = (ROUNDS * faces) as usize;
+        (ROUND + BEGINNING) * seen + COLLAPSE * (faces - self.left(flat)) as usize
+    }
+
     /// Decimates towards the target, not below it; as far as it is worth it.
     ///
     /// # Errors
     /// As [`Greedy::advance`].
-    pub fn reduce<S: EdgeStore, C: Cost<S>>(&mut self, flat: &mut Flat<C::State>) -> Result<Done> {
+    pub fn reduce<S: EdgeStore, C: Cost<S>>(
+        &self,
+        flat: &mut Flat<C::State>,
+        meter: &mut Meter,
+    ) -> Result<Done> {
         let mut done = Done::default();
         let left = self.left(flat);
         while let Some(Sizes { density, vertices }) = self.sizes(flat, left) {
             let faces = flat.triangle_count();
             let until = Until::Density(density);
-            let max_cost = self.round::<S, C>(flat, until, &vertices, &mut done)?;
-            if done.is_cancelled || done.is_disoriented {
+            let max_cost = self.round::<S, C>(flat, until, &vertices, &mut done, meter)?;
+            if done.is_disoriented {
                 break;
             }
-            self.round::<S, C>(flat, Until::Cost(max_cost), &vertices, &mut done)?;
-            if done.is_cancelled || flat.triangle_count() as f64 > WORTHWHILE * faces as f64 {
+            self.round::<S, C>(flat, Until::Cost(max_cost), &vertices, &mut done, meter)?;
+            if flat.triangle_count() as f64 > WORTHWHILE * faces as f64 {
                 break;
             }
         }
@@ -204,11 +224,12 @@ impl Chunked<'_> {
 
     /// Cuts, decimates every chunk, and puts the results together. The threshold.
     fn round<S: EdgeStore, C: Cost<S>>(
-        &mut self,
+        &self,
         flat: &mut Flat<C::State>,
         until: Until,
         chunk_vertices: &Range<usize>,
         done: &mut Done,
+        meter: &mut Meter,
     ) -> Result<f32> {
         let is_first = done.rounds == 0;
         let shift = if done.rounds.is_multiple_of(2) {
@@ -216,17 +237,24 @@ impl Chunked<'_> {
         } else {
             SHIFT
         };
-        let cut = Cut::new(flat, shift, chunk_vertices);
+        let cut = Cut::new(flat, shift, chunk_vertices, meter)?;
         let mut triangles = flat.triangle_count();
         let mut outcomes: Vec<Option<Outcome<C::State>>> = Vec::new();
         outcomes.resize_with(cut.len(), || None);
         let (options, scale, stop) = (self.options, self.scale, self.stop);
         let begin = |chunk| Chunk::<S, C>::begin(options, scale, flat, &cut, chunk, is_first);
+        let at_a_time = (BATCH_OF_THREAD * rayon::current_num_threads()).min(BATCH);
         let max_cost = match until {
             Until::Cost(max_cost) => max_cost,
             Until::Density(density) => {
                 let pilots = pilots(cut.len());
-                let mut chunks: Vec<_> = pilots.par_iter().map(|&k| begin(k)).collect();
+                let mut chunks: Vec<Chunk<S, C>> = Vec::with_capacity(pilots.len());
+                for pilots in pilots.chunks(at_a_time) {
+                    let first = chunks.len();
+                    chunks.par_extend(pilots.par_iter().map(|&k| begin(k)));
+                    let begun = chunks[first..].iter().map(|c| c.triangles_before);
+                    meter.work(BEGINNING * begun.sum::<usize>())?;
+                }
                 let faces: usize = chunks.iter().map(|c| c.greedy.triangles()).sum();
                 let conflicts: usize = chunks.iter().map(|c| c.singular.conflicts).sum();
                 if conflicts as f64 > DISORIENTED * faces as f64 {
@@ -234,7 +262,7 @@ impl Chunked<'_> {
                     return Ok(0.0);
                 }
                 let budget = triangles.saturating_sub(self.stop.triangles);
-                let max_cost = self.advance_together(&mut chunks, density, budget)?;
+                let max_cost = self.advance_together(&mut chunks, density, budget, meter)?;
                 let piloted: usize = chunks.iter().map(Chunk::bytes).sum();
                 done.note_bytes(piloted + cut.bytes());
                 let ended: Vec<_> = chunks.into_par_iter().map(Chunk::end).collect();
@@ -249,7 +277,7 @@ impl Chunked<'_> {
         done.chunks += cut.len();
         let rest: Vec<usize> = (0..cut.len()).filter(|&k| outcomes[k].is_none()).collect();
         let mut rest = &rest[..];
-        while !rest.is_empty() && !done.is_cancelled {
+        while !rest.is_empty() {
             // No batch may take the whole below the target, whatever it removes.
             let budget = triangles.saturating_sub(self.stop.triangles);
             let mut faces = 0;
@@ -257,7 +285,7 @@ impl Chunked<'_> {
                 faces += 2 * cut.faces(**k).map(|range| range.len()).sum::<usize>();
                 faces <= budget
             };
-            let batch = rest.iter().take(BATCH).take_while(fits).count().max(1);
+            let batch = rest.iter().take(at_a_time).take_while(fits).count().max(1);
             let (now, later) = rest.split_at(batch);
             rest = later;
             let ended: Vec<Outcome<C::State>> = now
@@ -271,17 +299,27 @@ impl Chunked<'_> {
                 .collect::<Result<_>>()?;
             for (&k, outcome) in now.iter().zip(ended) {
                 triangles -= outcome.removed_triangles;
+                let faces = outcome.triangles.len() + outcome.removed_triangles;
+                meter.work(BEGINNING * faces + COLLAPSE * outcome.removed_triangles)?;
                 outcomes[k] = Some(outcome);
             }
-            done.is_cancelled = (self.progress)(triangles).is_break();
         }
-        for outcome in outcomes.iter().flatten() {
+        // Each had its turn.
+        let outcomes: Vec<_> = outcomes.into_iter().flatten().collect();
+        for outcome in &outcomes {
             done.tally.add(&outcome.tally);
         }
-        let left: usize = outcomes.iter().flatten().map(Outcome::bytes).sum();
+        let left: usize = outcomes.iter().map(Outcome::bytes).sum();
         done.note_bytes(left + cut.bytes());
-        let non_manifold_edges =
-            assemble::<S, C>(self.options, self.scale, flat, &cut, outcomes, is_first);
+        let non_manifold_edges = assemble::<S, C>(
+            self.options,
+            self.scale,
+            flat,
+            &cut,
+            outcomes,
+            is_first,
+            meter,
+        )?;
         if is_first {
             done.non_manifold_edges_in = non_manifold_edges;
         }
@@ -295,6 +333,7 @@ impl Chunked<'_> {
         chunks: &mut [Chunk<S, C>],
         density: f64,
         budget: usize,
+        meter: &mut Meter,
     ) -> Result<f32> {
         let rings = (DISTURBED / density.sqrt()).ceil() as usize;
         let deep: Vec<Vec<VertexId>> = chunks.par_iter().map(|c| c.deep(rings)).collect();
@@ -321,12 +360,15 @@ impl Chunked<'_> {
                     chunk.advance(check, stop, max_cost, least)
                 })
                 .collect::<Result<_>>()?;
-            if halts.contains(&Halt::Target) && triangles(chunks) < now {
+            let left = triangles(chunks);
+            meter.work(COLLAPSE * (now - left))?;
+            meter.detour(chunks.len())?;
+            if halts.contains(&Halt::Target) && left < now {
                 continue;
             }
             let next = halts.iter().filter_map(|halt| match halt {
                 Halt::Cost(next) => Some(*next),
-                Halt::Target | Halt::Empty | Halt::Cancelled => None,
+                Halt::Target | Halt::Empty => None,
             });
             let Some(next) = next.reduce(f32::min) else {
                 return Ok(f32::INFINITY);
@@ -464,7 +506,7 @@ impl RimEdge {
 }
 
 impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
-    /// Builds the mesh of a chunk and queues its edges.
+    /// Builds the mesh of a chunk and queues its edges; on any thread, so that nobody is told.
     fn begin(
         options: &Options,
         scale: f64,
@@ -523,12 +565,11 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             .map(|v| v >= own || cut.is_shared(begin + v))
             .collect();
         let (cost, singular) = if is_first {
-            (C::new(&surface, options), singular(&surface, &vertices))
+            let cost = unheard(|meter| C::new(&surface, options, meter));
+            (cost, singular(&surface, &vertices))
         } else {
-            (
-                C::with_states(&surface, options, states),
-                Singular::default(),
-            )
+            let cost = unheard(|meter| C::with_states(&surface, options, states, meter));
+            (cost, Singular::default())
         };
         // Neighbours that do not agree wait until the whole is oriented.
         for e in surface.mesh.same_way_pairs() {
@@ -537,7 +578,9 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             }
         }
         let inner = surface.seam.iter().filter(|&&on_seam| !on_seam).count();
-        let greedy = Greedy::new(surface, cost, Topology::Preserve, Tally::default());
+        let greedy = unheard(|meter| {
+            Greedy::new(surface, cost, Topology::Preserve, Tally::default(), meter)
+        });
         Self {
             triangles_before: greedy.triangles(),
             greedy,
@@ -599,8 +642,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             max_cost,
             ..stop
         };
-        let on = &mut |_| ControlFlow::Continue(());
-        self.greedy.advance(stop, check, on)
+        self.greedy.advance(stop, check, &mut Meter::unheard())
     }
 
     /// The bytes that the chunk holds.
@@ -681,18 +723,19 @@ fn singular<S: EdgeStore>(surface: &Surface<S>, vertices: &[u32]) -> Singular {
 }
 
 /// Puts what is left of the chunks in the place of the whole; the number of non-manifold edges that
-/// the whole had, in the first round.
+/// the whole had, in the first round. Told to a meter: a unit a triangle that is left.
 fn assemble<S: EdgeStore, C: Cost<S>>(
     options: &Options,
     scale: f64,
     flat: &mut Flat<C::State>,
     cut: &Cut,
-    mut outcomes: Vec<Option<Outcome<C::State>>>,
+    mut outcomes: Vec<Outcome<C::State>>,
     is_first: bool,
-) -> usize {
+    meter: &mut Meter,
+) -> progress::Result<usize> {
     let mut rim: Vec<RimEdge> = Vec::new();
     let mut non_manifold_edges = 0;
-    for outcome in outcomes.iter_mut().flatten() {
+    for outcome in &mut outcomes {
         rim.append(&mut outcome.singular.rim);
         non_manifold_edges += outcome.singular.non_manifold_edges;
     }
@@ -706,7 +749,7 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
 
     let mut alive = vec![true; flat.positions.len()];
     flat.deviation.resize(flat.positions.len(), 0.0);
-    let left = outcomes.iter().flatten().map(|o| o.triangles.len()).sum();
+    let left = outcomes.iter().map(|o| o.triangles.len()).sum();
     let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(left);
     let mut flags = Vec::new();
     let mut carried = FlatWedges {
@@ -714,23 +757,10 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
         ..FlatWedges::default()
     };
     for (k, outcome) in outcomes.iter_mut().enumerate() {
-        let Some(outcome) = outcome else {
-            // Cancelled before its turn.
-            for range in cut.faces(k) {
-                triangles.extend_from_slice(&flat.triangles[range.clone()]);
-                flags.extend(flat.flags.get(range.clone()).into_iter().flatten());
-                let wedges = &flat.wedges;
-                let corners = wedges.corners.get(range.clone());
-                carried.corners.extend(corners.into_iter().flatten());
-                carried
-                    .groups
-                    .extend(wedges.groups.get(range).into_iter().flatten());
-            }
-            continue;
-        };
         let (part, wedges) = std::mem::take(&mut outcome.wedges);
         carried.append(&part, &wedges);
         flat.wedges.take_values(&part, &wedges);
+        meter.work(outcome.triangles.len())?;
         triangles.append(&mut outcome.triangles);
         flags.append(&mut outcome.flags);
         for v in cut.vertices(k) {
@@ -754,6 +784,7 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     }
     let renamed = renumbered(&alive);
     rename(&renamed, &mut triangles);
+    meter.detour(triangles.len())?;
     let lines: Vec<(u32, C::State)> = edges()
         .filter(is_singular)
         .flat_map(|edge| {
@@ -771,12 +802,14 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     retain(&alive, &mut flat.locked);
     retain(&alive, &mut flat.weights);
     retain(&alive, &mut flat.deviation);
+    meter.detour(alive.len())?;
     if is_first {
         flat.states = vec![C::State::default(); flat.positions.len()];
     } else {
         retain(&alive, &mut flat.states);
     }
-    for outcome in outcomes.into_iter().flatten() {
+    for outcome in outcomes {
+        meter.detour(outcome.kept.len())?;
         for kept in outcome.kept {
             flat.states[renamed[kept.vertex as usize] as usize] = kept.state;
         }
@@ -792,7 +825,7 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
     carried.values = std::mem::take(&mut flat.wedges.values);
     carried.drop_unused();
     flat.wedges = carried;
-    non_manifold_edges
+    Ok(non_manifold_edges)
 }
 
 fn gather<T: Clone>(values: &[T], ids: &[u32]) -> Vec<T> {

@@ -1,7 +1,5 @@
 //! The one loop: the cheapest edge, again and again, until a target is reached.
 
-use std::ops::ControlFlow;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -12,6 +10,7 @@ use super::report::{Blocked, StopReason, Tally};
 use super::surface::{Loss, Merged, Plan, Surface, Way};
 use crate::error::{Error, Result};
 use crate::mesh::{Disks, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
+use crate::progress::{self, COLLAPSE, Meter};
 
 /// When the loop stops.
 #[derive(Clone, Copy, Debug)]
@@ -33,9 +32,10 @@ pub enum Halt {
     Cost(f32),
     /// No candidate is left.
     Empty,
-    /// The caller asked to stop.
-    Cancelled,
 }
+
+/// What it takes to evaluate a face's edges, in units of work.
+pub const EVALUATION: usize = 6;
 
 /// The faces whose edges are evaluated at a time, in parallel; fewer are left to one thread.
 const BLOCK_FACES: usize = 1 << 16;
@@ -94,8 +94,15 @@ pub struct Greedy<S, C, Q> {
 }
 
 impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
-    /// Evaluates every edge, in parallel. Counting goes on from `tally`.
-    pub fn new(surface: Surface<S>, cost: C, topology: Topology, tally: Tally) -> Self {
+    /// Evaluates every edge, in parallel. Counting goes on from `tally`. Told to a meter:
+    /// [`EVALUATION`] units a face slot.
+    pub fn new(
+        surface: Surface<S>,
+        cost: C,
+        topology: Topology,
+        tally: Tally,
+        meter: &mut Meter,
+    ) -> progress::Result<Self> {
         let mut greedy = Self {
             cost,
             queue: Q::for_edges(3 * surface.mesh.face_slots()),
@@ -123,13 +130,17 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             tally,
         };
         greedy.tally.rejected_lock += greedy.locked_edges();
-        greedy.queue_all(|_, _| true);
-        greedy
+        greedy.queue_all(|_, _| true, meter)?;
+        Ok(greedy)
     }
 
     /// Queues every edge that `choose` takes; evaluated in parallel where they are many. Whether there
     /// is one.
-    fn queue_all(&mut self, choose: impl Fn(&Self, &Candidate) -> bool + Sync) -> bool {
+    fn queue_all(
+        &mut self,
+        choose: impl Fn(&Self, &Candidate) -> bool + Sync,
+        meter: &mut Meter,
+    ) -> progress::Result<bool> {
         let slots = self.surface.mesh.face_slots();
         let evaluate = |greedy: &Self, first: usize, found: &mut Vec<Candidate>| {
             let mesh = &greedy.surface.mesh;
@@ -154,9 +165,10 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             for first in (0..slots).step_by(PART_FACES) {
                 evaluate(self, first, &mut found);
                 queue(&mut self.queue, &mut found);
+                meter.work(EVALUATION * PART_FACES)?;
             }
             self.found = found;
-            return is_any;
+            return Ok(is_any);
         }
         // In blocks, so that no second copy of all candidates is held.
         for first in (0..slots).step_by(BLOCK_FACES) {
@@ -172,32 +184,32 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             for mut part in parts {
                 queue(&mut self.queue, &mut part);
             }
+            meter.work(EVALUATION * (last - first))?;
         }
-        is_any
+        Ok(is_any)
     }
 
     /// Collapses until a target is reached or nothing is left to collapse.
     ///
-    /// `progress` is told the triangles left, now and then, and may stop the loop. `check` verifies
-    /// the mesh after every collapse.
+    /// Told to a meter: [`COLLAPSE`] units a triangle that goes. `check` verifies the mesh after every
+    /// collapse.
     ///
     /// # Errors
-    /// [`Error::Internal`] where `check` finds something wrong.
+    /// [`Error::Internal`] where `check` finds something wrong, [`Error::Cancelled`].
     pub fn run(
         &mut self,
         stop: Stop,
         check: bool,
-        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        meter: &mut Meter,
     ) -> Result<(StopReason, Option<Blocked>)> {
         loop {
-            match self.advance(stop, check, progress)? {
+            match self.advance(stop, check, meter)? {
                 Halt::Target => return Ok((StopReason::Target, None)),
-                Halt::Cancelled => return Ok((StopReason::Cancelled, None)),
                 Halt::Empty | Halt::Cost(_) => {}
             }
-            if !self.revive() {
+            if !self.revive(meter)? {
                 if self.components.is_empty() {
-                    return Ok(self.blocked());
+                    return Ok(self.blocked(meter)?);
                 }
                 self.remove_component();
             }
@@ -208,12 +220,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn advance(
-        &mut self,
-        stop: Stop,
-        check: bool,
-        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<Halt> {
+    pub fn advance(&mut self, stop: Stop, check: bool, meter: &mut Meter) -> Result<Halt> {
         self.stop = stop;
         let exact_below = self.cost.exact_below();
         let halt = loop {
@@ -224,6 +231,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 Ok(candidate) => candidate,
                 Err(halt) => break halt,
             };
+            meter.detour(COLLAPSE)?;
             let e = candidate.edge;
             if self
                 .components
@@ -264,24 +272,21 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                         self.surface.mesh.check().map_err(|wrong| {
                             Error::Internal(format!("after {:?}: {wrong}", merged.collapse))
                         })?;
+                        meter.detour(4 * self.surface.mesh.face_slots())?;
                     }
                     self.cost
                         .after_collapse(&self.surface, &merged, &mut self.changed);
                     let faces = self.surface.mesh.face_count();
                     let faces_before = faces + merged.collapse.dead_faces.len();
                     if faces < exact_below && faces_before >= exact_below {
-                        self.queue_all(|_, _| true);
+                        self.queue_all(|_, _| true, meter)?;
                     } else {
                         if C::IS_LAZY {
                             self.complete(merged.collapse.kept, candidate.cost);
                         }
                         self.reconsider();
                     }
-                    if self.tally.collapses.is_multiple_of(1024)
-                        && progress(self.triangles).is_break()
-                    {
-                        break Halt::Cancelled;
-                    }
+                    meter.work(COLLAPSE * merged.collapse.dead_faces.len())?;
                 }
             }
         };
@@ -719,21 +724,23 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
 
     /// Puts what can be collapsed after all back into the queue: what was refused once and has not
     /// been evaluated since, because no cost around it changed. Whether there is anything.
-    fn revive(&mut self) -> bool {
-        self.queue_all(|greedy, c| {
+    fn revive(&mut self, meter: &mut Meter) -> progress::Result<bool> {
+        let is_possible = |greedy: &Self, c: &Candidate| {
             greedy
                 .evaluate(c.edge)
                 .is_some_and(|e| greedy.way(c.edge, None, e.position).is_ok())
-        })
+        };
+        self.queue_all(is_possible, meter)
     }
 
     /// Why nothing is left to collapse: the reason of every edge that is left.
-    fn blocked(&self) -> (StopReason, Option<Blocked>) {
+    fn blocked(&self, meter: &mut Meter) -> progress::Result<(StopReason, Option<Blocked>)> {
         let mut blocked = Blocked {
             lock: self.locked_edges(),
             ..Blocked::default()
         };
         for e in self.surface.mesh.edges() {
+            meter.detour(EVALUATION)?;
             let Some(Evaluation { position, .. }) = self.evaluate(e) else {
                 continue;
             };
@@ -749,7 +756,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         } else {
             StopReason::Blocked
         };
-        (reason, Some(blocked))
+        Ok((reason, Some(blocked)))
     }
 
     /// The edges that no collapse is asked of, since both ends are held.

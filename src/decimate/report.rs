@@ -16,8 +16,6 @@ pub enum StopReason {
     MaxError,
     /// No collapse is left that keeps the topology, turns no face and moves no locked vertex.
     Blocked,
-    /// The caller asked to stop.
-    Cancelled,
 }
 
 /// Why the edges that are left cannot be collapsed, counted when decimation stopped short.

@@ -8,6 +8,7 @@ use super::options::{AttributeUse, Boundary, Options};
 use super::rules;
 use super::wedges::{Carried, Wedges};
 use crate::mesh::{Collapse, Contraction, Disks, EdgeId, EdgeStore, FaceId, Mesh, VertexId};
+use crate::progress::{self, BLOCK, Meter};
 
 /// A collapse, and where its ends were.
 pub struct Merged {
@@ -103,17 +104,19 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Locks the boundary and marks creases, where that is asked for. Needs the whole surface.
-    pub fn prepare(&mut self, options: &Options) {
+    pub fn prepare(&mut self, options: &Options, meter: &mut Meter) -> progress::Result<()> {
         if options.boundary == Boundary::Lock {
             self.lock_boundary();
+            meter.detour(self.mesh.face_slots())?;
         }
         if let Some(degrees) = options.feature_angle_degrees {
-            self.mark_creases(degrees);
+            self.mark_creases(degrees, meter)?;
         }
         if options.attributes == AttributeUse::Optimize {
             self.wedges.smooth(&self.mesh);
         }
         self.mark_attribute_seams(options.attributes);
+        meter.detour(self.mesh.face_slots())
     }
 
     /// Marks the borders of groups as creases, and attribute seams unless attributes are but carried.
@@ -177,7 +180,7 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Marks the edges at which the surface turns by more than `degrees` as creases.
-    fn mark_creases(&mut self, degrees: f64) {
+    fn mark_creases(&mut self, degrees: f64, meter: &mut Meter) -> progress::Result<()> {
         let (mesh, geometry) = (&self.mesh, &self.geometry);
         let flattest = degrees.to_radians().cos();
         let is_sharp = |e: EdgeId| {
@@ -188,10 +191,16 @@ impl<S: EdgeStore> Surface<S> {
             })
         };
         let mut creases = vec![false; 3 * mesh.face_slots()];
-        for e in mesh.faces().flat_map(FaceId::edges) {
-            creases[e.index()] = is_sharp(e);
+        for f in mesh.faces() {
+            for e in f.edges() {
+                creases[e.index()] = is_sharp(e);
+            }
+            if f.index() % BLOCK == 0 {
+                meter.detour(2 * BLOCK)?;
+            }
         }
         self.creases = creases;
+        Ok(())
     }
 
     /// How many edges at `v` are creases, boundaries or non-manifold: 0 on a smooth piece, 2 on a

@@ -1242,23 +1242,6 @@ fn a_mesh_without_triangles_is_an_error() {
     assert!(error.contains("1 name a vertex twice"), "{error}");
 }
 
-/// Breaking stops with a whole mesh.
-#[test]
-fn cancelling_gives_the_mesh_so_far() {
-    let mut calls = 0;
-    let mut stop = |_: Progress| {
-        calls += 1;
-        ControlFlow::Break(())
-    };
-    let shape = bumpy(60);
-    let (small, report) =
-        decimate_with_progress(mesh(shape), &to_triangles(10), &mut stop).unwrap();
-    assert_eq!(calls, 1);
-    assert_eq!(report.stop_reason, StopReason::Cancelled);
-    assert_eq!(small.triangle_count(), report.triangles_out);
-    assert!(report.triangles_out > 10 && report.triangles_out < 7200);
-}
-
 /// Zero area everywhere, or nearly: no panic, no endless loop, nothing not finite.
 #[test]
 fn degenerate_geometry_is_input() {
@@ -1504,22 +1487,4 @@ mod chunked {
         chunks_stop_at_the_largest_error,
         chunks_count_what_is_not_manifold,
     );
-
-    /// The caller may stop between chunks, and has the mesh as it is by then.
-    #[test]
-    fn chunks_can_be_cancelled() {
-        let original = mesh(bumpy(100));
-        let options = in_chunks(Quality::Fast, 500, Chunks::Triangles(200));
-        let mut calls = 0;
-        let mut stop = |progress: Progress| {
-            calls += 1;
-            assert!(progress.triangles >= progress.triangles_target);
-            ControlFlow::Break(())
-        };
-        let (small, report) =
-            decimate_with_progress(original.clone(), &options, &mut stop).unwrap();
-        assert_eq!(report.stop_reason, StopReason::Cancelled);
-        assert!(report.stopped_short && calls == 1);
-        assert!(small.triangle_count() > 500 && small.triangle_count() < original.triangle_count());
-    }
 }

@@ -143,6 +143,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<IndexedMesh> {
 /// Reads a mesh as [`read`] does, from any source of bytes: `name` stands for its path, in messages
 /// and where an extension tells the format.
 ///
+/// A source that counts its bytes tells how far reading is, and one that fails stops it.
+///
 /// `length` is how many bytes the source has, where that is known: it bounds what a header makes
 /// room for, and tells a binary STL. A wrong one is found out as a wrong header is.
 ///
@@ -222,7 +224,8 @@ pub fn write(path: &Path, mesh: &IndexedMesh, options: &WriteOptions) -> Result<
 }
 
 /// Writes a mesh as [`write()`] does, to any writer: `name` stands for its path, in messages and
-/// where an extension tells the format.
+/// where an extension tells the format. A writer that counts its bytes tells how far writing is, and
+/// one that fails stops it.
 ///
 /// # Errors
 /// As [`write()`].

@@ -3,6 +3,7 @@
 
 use super::link::{Opposite, OppositeWord, Outgoing, OutgoingWord};
 use super::{EdgeId, EdgeStore, Mesh, SideTable, VertexId};
+use crate::progress::{self, BLOCK, Meter, unheard};
 
 impl<S: EdgeStore> Mesh<S> {
     /// The connectivity of these triangles over `vertices` vertices.
@@ -15,15 +16,26 @@ impl<S: EdgeStore> Mesh<S> {
     /// Where a triangle names a vertex that is not there or one vertex twice, or 3m exceeds 2³¹−1.
     /// Duplicate triangles are allowed: their edges are non-manifold.
     pub fn from_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        unheard(|meter| Self::from_triangles_with(vertices, triangles, meter))
+    }
+
+    /// [`from_triangles`](Self::from_triangles), told to a meter: [`UNITS`] a triangle, more where
+    /// it is not manifold.
+    pub(crate) fn from_triangles_with(
+        vertices: usize,
+        triangles: &[[u32; 3]],
+        meter: &mut Meter,
+    ) -> progress::Result<Self> {
         assert!(
             triangles.len() <= i32::MAX as usize / 3,
             "too many triangles"
         );
-        let corners = Corners::of(vertices, triangles);
-        let mut links = Links::of(&corners);
-        links.add_edge_rows(&corners);
+        let corners = Corners::of(vertices, triangles, meter)?;
+        let mut links = Links::of(&corners, meter)?;
+        links.add_edge_rows(&corners, meter)?;
         let edges = links.edges_of_several_fans(&corners);
         drop(corners);
+        meter.detour(edges.len())?;
         let mut mesh = Self {
             store: S::from_triangles(triangles, &links.opposites),
             outgoing: links.outgoing,
@@ -33,14 +45,15 @@ impl<S: EdgeStore> Mesh<S> {
             live_vertices: links.settled,
         };
         drop(links.opposites);
-        mesh.add_fans(&edges);
-        mesh
+        meter.work(triangles.len())?;
+        mesh.add_fans(&edges, meter)?;
+        Ok(mesh)
     }
 
     /// Adds the fans that these edges, ascending, lie in.
-    fn add_fans(&mut self, edges: &[u32]) {
+    fn add_fans(&mut self, edges: &[u32], meter: &mut Meter) -> progress::Result<()> {
         if edges.is_empty() {
-            return;
+            return Ok(());
         }
         let mut seen = vec![false; self.store.slots()];
         for e in edges.iter().map(|&e| EdgeId::new(e as usize)) {
@@ -48,12 +61,16 @@ impl<S: EdgeStore> Mesh<S> {
                 continue;
             }
             let start = self.fan_start(e);
+            let mut around = 0;
             for e in self.fan(start) {
                 seen[e.index()] = true;
+                around += 1;
             }
             self.add_fan(self.tail(e), start);
+            meter.detour(2 * around)?;
         }
         self.fan_rows.sort_all();
+        Ok(())
     }
 
     /// Adds a fan, given by its first edge, to those of `v`; leaves the row of several unsorted.
@@ -72,6 +89,9 @@ impl<S: EdgeStore> Mesh<S> {
         self.set_outgoing(v, outgoing);
     }
 }
+
+/// The work that building takes, per triangle.
+pub(crate) const UNITS: usize = 5;
 
 /// The corners of each vertex, ascending.
 ///
@@ -108,14 +128,17 @@ impl Corner {
 
 impl Corners {
     /// Sorts the corners by vertex, counting.
-    fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+    fn of(vertices: usize, triangles: &[[u32; 3]], meter: &mut Meter) -> progress::Result<Self> {
         let mut ends = vec![0u32; vertices];
         let mut are_proper = true;
-        for t in triangles {
-            are_proper &= (t[0] != t[1]) & (t[1] != t[2]) & (t[2] != t[0]);
-            for &v in t {
-                ends[v as usize] += 1;
+        for block in triangles.chunks(BLOCK) {
+            for t in block {
+                are_proper &= (t[0] != t[1]) & (t[1] != t[2]) & (t[2] != t[0]);
+                for &v in t {
+                    ends[v as usize] += 1;
+                }
             }
+            meter.work(block.len())?;
         }
         assert!(are_proper, "a triangle needs three different vertices");
         let mut begin = 0;
@@ -124,18 +147,23 @@ impl Corners {
         }
         // Filling moves each begin to its end.
         let mut list = vec![Corner::default(); 3 * triangles.len()];
-        for (first, &[a, b, c]) in (0..).step_by(3).zip(triangles) {
-            for (k, v, x, y) in [(0, a, c, b), (1, b, a, c), (2, c, b, a)] {
-                let end = &mut ends[v as usize];
-                list[*end as usize] = Corner {
-                    out: first + k,
-                    x,
-                    y,
-                };
-                *end += 1;
+        let mut first = 0;
+        for block in triangles.chunks(BLOCK) {
+            for &[a, b, c] in block {
+                for (k, v, x, y) in [(0, a, c, b), (1, b, a, c), (2, c, b, a)] {
+                    let end = &mut ends[v as usize];
+                    list[*end as usize] = Corner {
+                        out: first + k,
+                        x,
+                        y,
+                    };
+                    *end += 1;
+                }
+                first += 3;
             }
+            meter.work(block.len())?;
         }
-        Self { list, ends }
+        Ok(Self { list, ends })
     }
 
     fn of_vertex(&self, v: u32) -> &[Corner] {
@@ -176,7 +204,7 @@ impl Links {
     /// Each edge comes in at one vertex, and finds there the edge that goes out to where it comes
     /// from. An edge that is not manifold has two that go out to the same vertex: what is found at
     /// its ends is wrong, and its smaller end crowded.
-    fn of(corners: &Corners) -> Self {
+    fn of(corners: &Corners, meter: &mut Meter) -> progress::Result<Self> {
         let Corners { list, ends } = corners;
         let mut links = Self {
             opposites: vec![OppositeWord::BOUNDARY; list.len()],
@@ -223,13 +251,17 @@ impl Links {
                 _ => links.unsettled.push(v),
             }
             begin = end;
+            // About two triangles a vertex, each two units.
+            if v as usize % BLOCK == BLOCK - 1 {
+                meter.work(4 * BLOCK)?;
+            }
         }
-        links
+        Ok(links)
     }
 
     /// Gives every edge that is not manifold its row, in the order of their smaller ends, then of
     /// their larger ends; unsettles both.
-    fn add_edge_rows(&mut self, corners: &Corners) {
+    fn add_edge_rows(&mut self, corners: &Corners, meter: &mut Meter) -> progress::Result<()> {
         self.crowded.sort_unstable();
         self.crowded.dedup();
         let mut sides: Vec<(u32, bool, EdgeId)> = Vec::new();
@@ -240,6 +272,7 @@ impl Links {
                 sides.push((c.y, true, EdgeId::new(c.out as usize)));
             }
             sides.sort_unstable();
+            meter.detour(sides.len())?;
             for edge in sides.chunk_by(|a, b| a.0 == b.0) {
                 let is_manifold = match *edge {
                     [_] => true,
@@ -263,6 +296,7 @@ impl Links {
                 }
             }
         }
+        Ok(())
     }
 
     /// The edges that leave unsettled vertices, ascending.

@@ -8,6 +8,7 @@ use super::{EdgeId, EdgeStore, FaceId, Mesh, OppositeWord, VertexId};
 
 /// What a collapse did.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Collapse {
     /// The vertex that is left (the collapsed edge's head).
     pub kept: VertexId,

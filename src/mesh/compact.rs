@@ -5,6 +5,7 @@ use super::{EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 
 /// Where everything went: old slot → new slot. Corner 3f+k goes where its face goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Compaction {
     /// One entry a former vertex slot; nothing for a dead or isolated vertex.
     pub vertices: Vec<Option<VertexId>>,

@@ -14,6 +14,7 @@ const PATIENCE: usize = 32;
 
 /// Which corners get a copy of their vertex.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Cut {
     /// The vertex that each copy is one of, ascending. The copies are numbered on from the vertex
     /// slots.

@@ -25,7 +25,7 @@
 //! [new](Mesh::new_face).
 
 mod add;
-mod build;
+pub(crate) mod build;
 mod check;
 mod collapse;
 mod compact;

@@ -2,8 +2,10 @@
 
 use super::link::Opposite;
 use super::{EdgeId, EdgeStore, FaceId, Mesh};
+use crate::progress::{self, Meter, unheard};
 
 /// A mesh whose faces agree with their neighbours where they can.
+#[non_exhaustive]
 pub struct Oriented<S> {
     /// The connectivity.
     pub mesh: Mesh<S>,
@@ -29,25 +31,35 @@ impl<S: EdgeStore> Mesh<S> {
     ///
     /// # Panics
     /// As [`from_triangles`](Self::from_triangles).
-    pub fn oriented(vertices: usize, mut triangles: Vec<[u32; 3]>) -> Oriented<S> {
-        let mesh = Self::from_triangles(vertices, &triangles);
+    pub fn oriented(vertices: usize, triangles: Vec<[u32; 3]>) -> Oriented<S> {
+        unheard(|meter| Self::oriented_with(vertices, triangles, meter))
+    }
+
+    /// [`oriented`](Self::oriented), told to a meter, with the units of
+    /// [`from_triangles_with`](Self::from_triangles_with); more where neighbours disagree.
+    pub(crate) fn oriented_with(
+        vertices: usize,
+        mut triangles: Vec<[u32; 3]>,
+        meter: &mut Meter,
+    ) -> progress::Result<Oriented<S>> {
+        let mesh = Self::from_triangles_with(vertices, &triangles, meter)?;
         let disagreements = mesh.same_way_pair_count();
         if disagreements == 0 {
-            return Oriented {
+            return Ok(Oriented {
                 mesh,
                 flipped: Vec::new(),
                 disagreements,
-            };
+            });
         }
-        let flipped = mesh.faces_to_flip();
+        let flipped = mesh.faces_to_flip(meter)?;
         drop(mesh);
         turn_round(&mut triangles, &flipped);
-        let mesh = Self::from_triangles(vertices, &triangles);
-        Oriented {
+        let mesh = Self::from_triangles_with(vertices, &triangles, meter)?;
+        Ok(Oriented {
             mesh,
             flipped,
             disagreements,
-        }
+        })
     }
 
     /// The number of edges that exactly two faces share and run along the same way.
@@ -65,7 +77,7 @@ impl<S: EdgeStore> Mesh<S> {
     /// with exactly two faces) the smaller part. Edges of a Möbius strip stay in conflict.
     ///
     /// One flag a face slot. Linear time.
-    pub fn faces_to_flip(&self) -> Vec<bool> {
+    fn faces_to_flip(&self, meter: &mut Meter) -> progress::Result<Vec<bool>> {
         let mut flip = vec![false; self.face_slots()];
         let mut seen = vec![false; self.face_slots()];
         let mut component: Vec<FaceId> = Vec::new();
@@ -78,6 +90,7 @@ impl<S: EdgeStore> Mesh<S> {
             let mut done = 0;
             while let Some(&f) = component.get(done) {
                 done += 1;
+                meter.detour(2)?;
                 for (other, agrees) in f.edges().into_iter().filter_map(|e| self.pair(e)) {
                     let g = other.face();
                     if !std::mem::replace(&mut seen[g.index()], true) {
@@ -93,7 +106,7 @@ impl<S: EdgeStore> Mesh<S> {
                 }
             }
         }
-        flip
+        Ok(flip)
     }
 
     /// The other directed edge of an edge with exactly two faces, and whether it runs the other way.

@@ -152,7 +152,8 @@ impl Reference {
         })
     }
 
-    /// Measures a mesh against this reference. The same bytes with any number of threads.
+    /// Measures a mesh against this reference. The same bytes with any number of threads. Runs to its
+    /// end and tells nobody how far it is.
     ///
     /// # Errors
     /// [`Error::InvalidMesh`] where cleaning leaves no triangle, or the mesh lies so far away that

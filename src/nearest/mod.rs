@@ -15,8 +15,8 @@ mod triangle;
 
 use glam::{DVec3, Vec3, Vec4};
 
-pub use lanes::{Faces, Feet, Points};
-pub use patch::{GROUP, Near, Patch};
+pub(crate) use lanes::{Faces, Points};
+pub(crate) use patch::{GROUP, Near, Patch};
 pub use triangle::{Foot, Nearest, foot_on_triangle, nearest_on_triangle};
 
 /// Triangles in a subtree that is worth a thread of its own.

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 /// A nearest point and where it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Nearest {
     /// The point.
     pub point: DVec3,
@@ -29,6 +30,7 @@ impl Nearest {
 
 /// The nearest point of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Foot {
     /// The point.
     pub point: DVec3,

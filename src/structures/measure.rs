@@ -34,6 +34,7 @@ const BUILD_BUDGET: Duration = Duration::from_millis(100);
 
 /// A mesh in every structure.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Measured {
     /// What a face is.
     #[serde(rename = "face")]
@@ -56,6 +57,7 @@ pub struct Measured {
 
 /// A structure in the table.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Row {
     /// Its name.
     pub structure: &'static str,
@@ -95,6 +97,7 @@ pub struct Row {
 
 /// What is counted by faces; its keys name them.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct PerFace {
     /// What a face is.
     pub face_name: &'static str,
@@ -122,6 +125,7 @@ impl Serialize for PerFace {
 
 /// A query: what an answer costs, and took.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct QueryTime {
     /// What it depends on.
     pub cost: Cost,
@@ -131,6 +135,7 @@ pub struct QueryTime {
 
 /// All queries.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct QueryTimes {
     /// FV.
     pub face_vertices: QueryTime,

@@ -16,6 +16,7 @@ use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
 use crate::decimate::wedges::Carried;
 use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, VertexId};
+use crate::progress::{self, Meter};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
 /// y from the vertex, where single precision has all its digits. 40 bytes.
@@ -134,7 +135,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
     type Queue = LazyHeap;
     type State = Quadric;
 
-    fn new(surface: &Surface<S>, options: &Options) -> Self {
+    fn new(surface: &Surface<S>, options: &Options, meter: &mut Meter) -> progress::Result<Self> {
         let mesh = &surface.mesh;
         let mut quadrics = vec![Quadric::default(); mesh.vertex_slots()];
         let mut faces = mesh.faces();
@@ -146,6 +147,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
                 count += 1;
             }
             add_planes(surface, four, count, &mut quadrics);
+            meter.work(3 * count)?;
         }
         let boundary = boundary_weight(options.boundary);
         for e in mesh.faces().flat_map(FaceId::edges) {
@@ -165,25 +167,31 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
                 }
             }
         }
+        meter.work(mesh.face_count())?;
         if !surface.weights.is_empty() {
             for (v, quadric) in quadrics.iter_mut().enumerate() {
                 let weight = surface.weight(VertexId::new(v)) as f32;
                 quadric.0.iter_mut().for_each(|number| *number *= weight);
             }
         }
-        Self {
+        Ok(Self {
             quadrics,
             attributes: AttributeForms::new(surface),
             placement: options.placement,
-        }
+        })
     }
 
-    fn with_states(surface: &Surface<S>, options: &Options, states: Vec<Quadric>) -> Self {
-        Self {
+    fn with_states(
+        surface: &Surface<S>,
+        options: &Options,
+        states: Vec<Quadric>,
+        _: &mut Meter,
+    ) -> progress::Result<Self> {
+        Ok(Self {
             quadrics: states,
             attributes: AttributeForms::new(surface),
             placement: options.placement,
-        }
+        })
     }
 
     fn into_states(self) -> Vec<Quadric> {

@@ -16,6 +16,7 @@ use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::wedges::Carried;
 use crate::mesh::{EdgeId, EdgeStore, Opposite, VertexId};
+use crate::progress::{self, Meter};
 
 /// The squared length that the sum of a star's normals must have for the volume constraint to say
 /// something, relative to the squared trace: below, the star is a folded sheet.
@@ -166,13 +167,16 @@ fn least<T: Number>(
     form.compared(&x, precision.as_good)
 }
 
+/// The vertices that are looked at between two words about it.
+const AT_A_TIME: usize = 1 << 17;
+
 impl<S: EdgeStore> Cost<S> for Memoryless {
     const IS_LAZY: bool = false;
 
     type Queue = LazyHeap;
     type State = ();
 
-    fn new(surface: &Surface<S>, options: &Options) -> Self {
+    fn new(surface: &Surface<S>, options: &Options, meter: &mut Meter) -> progress::Result<Self> {
         let slots = surface.mesh.vertex_slots();
         let mut model = Self {
             tensors: Vec::new(),
@@ -191,13 +195,25 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             let vertices = &vertices[..four.len()];
             four.copy_from_slice(&model.tensors(surface, vertices)[..four.len()]);
         };
-        tensors.par_chunks_mut(LANES).enumerate().for_each(four);
+        let mut first = 0;
+        for part in tensors.chunks_mut(AT_A_TIME) {
+            let fours = part.par_chunks_mut(LANES).enumerate();
+            fours.for_each(|(i, vertices)| four((first / LANES + i, vertices)));
+            first += part.len();
+            // About two faces a vertex.
+            meter.work(8 * part.len())?;
+        }
         model.tensors = tensors;
-        model
+        Ok(model)
     }
 
-    fn with_states(surface: &Surface<S>, options: &Options, _: Vec<()>) -> Self {
-        Self::new(surface, options)
+    fn with_states(
+        surface: &Surface<S>,
+        options: &Options,
+        _: Vec<()>,
+        meter: &mut Meter,
+    ) -> progress::Result<Self> {
+        Self::new(surface, options, meter)
     }
 
     fn into_states(self) -> Vec<()> {
@@ -393,6 +409,7 @@ mod tests {
     use super::super::tests::surface;
     use super::*;
     use crate::mesh::Full;
+    use crate::progress::unheard;
     use crate::shapes;
 
     /// The loop waits for a candidate that costs 5 % more than it was queued at.
@@ -404,7 +421,7 @@ mod tests {
             shapes::three_fins(3),
         ] {
             let surface = surface::<Full>(shape);
-            let model = Memoryless::new(&surface, &Options::default());
+            let model = unheard(|meter| Memoryless::new(&surface, &Options::default(), meter));
             for e in surface.mesh.edges() {
                 let lanes: [f32; LANES] = model.costs(&surface, &[e; LANES]);
                 let one = model.evaluate(&surface, e, [false; 2]).unwrap().cost;

@@ -21,6 +21,7 @@ use super::queue::Queue;
 use super::surface::{Merged, Surface};
 use super::wedges::Carried;
 use crate::mesh::{EdgeId, EdgeStore, Mesh, Opposite, VertexId};
+use crate::progress::{self, Meter};
 
 /// A collapse's cost, in the unit box, and where its vertex goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +33,7 @@ pub struct Evaluation {
 }
 
 /// A cost model: owns its state and follows the collapses.
-pub trait Cost<S: EdgeStore>: Send + Sync {
+pub trait Cost<S: EdgeStore>: Send + Sync + Sized {
     /// Whether candidates are evaluated when they are popped, four at a time, and only the edges
     /// that have none after a collapse become candidates again: for costs that never fall.
     const IS_LAZY: bool;
@@ -44,11 +45,16 @@ pub trait Cost<S: EdgeStore>: Send + Sync {
     type State: Clone + Default + Send + Sync;
 
     /// The model of a surface, computed in parallel. Of a vertex on a seam it knows what the faces
-    /// here say, without the [lines](Self::line) of the rim.
-    fn new(surface: &Surface<S>, options: &Options) -> Self;
+    /// here say, without the [lines](Self::line) of the rim. Told to a meter: 4 units a face.
+    fn new(surface: &Surface<S>, options: &Options, meter: &mut Meter) -> progress::Result<Self>;
 
     /// The model of a surface whose states are known.
-    fn with_states(surface: &Surface<S>, options: &Options, states: Vec<Self::State>) -> Self;
+    fn with_states(
+        surface: &Surface<S>,
+        options: &Options,
+        states: Vec<Self::State>,
+        meter: &mut Meter,
+    ) -> progress::Result<Self>;
 
     /// The states, one a vertex slot.
     fn into_states(self) -> Vec<Self::State>;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::progress::{self, BLOCK, Meter};
 use crate::spatial::{AXIS_BITS, Grid};
 
 /// Bits of a cell's coordinate at most: a set of cells takes 2 MB then.
@@ -28,7 +29,13 @@ pub struct Cells {
 
 impl Cells {
     /// Sorts triangles by the cells of a grid. Takes 36 bytes a triangle while it runs, 4 to 5 after.
-    pub fn new(grid: Grid, count: usize, corners: impl Fn(usize) -> [Vec3; 3]) -> Self {
+    /// Told to a meter: 10 units a triangle.
+    pub fn new(
+        grid: Grid,
+        count: usize,
+        corners: impl Fn(usize) -> [Vec3; 3],
+        meter: &mut Meter,
+    ) -> progress::Result<Self> {
         let mut centroids = Vec::with_capacity(count);
         let mut extents = Vec::with_capacity(count);
         for i in 0..count {
@@ -40,8 +47,11 @@ impl Cells {
                 .max((c - center).abs());
             centroids.push(center);
             extents.push(extent.max_element());
+            if i % BLOCK == BLOCK - 1 {
+                meter.work(2 * BLOCK)?;
+            }
         }
-        let sorted = grid.sorted(&centroids);
+        let sorted = grid.sorted(&centroids, meter)?;
         drop(centroids);
         let mut order = Vec::with_capacity(count);
         let mut codes = Vec::with_capacity(count);
@@ -57,6 +67,7 @@ impl Cells {
             codes.push(code);
             order.push(i);
         }
+        meter.work(2 * count)?;
         let (mut bits, mut cells) = (0, 1);
         while bits < MOST_BITS {
             cells += more[bits as usize + 1];
@@ -85,13 +96,14 @@ impl Cells {
             true
         });
         order.shrink_to_fit();
-        Self {
+        meter.work(2 * count)?;
+        Ok(Self {
             grid,
             bits,
             order,
             occupied,
             large,
-        }
+        })
     }
 
     /// About how many triangles come before a position in Morton order.
@@ -176,6 +188,7 @@ fn side(grid: &Grid, bits: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::unheard;
     use crate::shapes;
 
     /// Every triangle whose box meets the box asked for is found, and none twice.
@@ -184,7 +197,8 @@ mod tests {
         let (mut positions, triangles) = shapes::icosphere(5);
         positions[7] *= 3.0;
         let corners = |i: usize| triangles[i].map(|v| positions[v as usize]);
-        let cells = Cells::new(Grid::over(&positions, 0.0), triangles.len(), corners);
+        let grid = Grid::over(&positions, 0.0);
+        let cells = unheard(|meter| Cells::new(grid, triangles.len(), corners, meter));
         assert!(cells.bits > 1 && !cells.large.is_empty());
         let mut seen = Seen::default();
         for i in 0..100 {

@@ -25,6 +25,7 @@ use glam::Vec3;
 
 use super::surface::Surface;
 use crate::mesh::{EdgeStore, FaceId, VertexId};
+use crate::progress::{self, Meter, Stage};
 use crate::spatial::Grid;
 use cells::Cells;
 pub use original::Arrays;
@@ -53,6 +54,12 @@ const SWEEPS: usize = 3;
 /// collapses, for less.
 const LIGHT: usize = 3;
 
+/// The work that fitting takes, in units: to find what lies near a face or a sample of the original,
+/// to look at an edge, and to look at a vertex and step.
+const FINDING: usize = 30;
+const LOOK: usize = 20;
+const STEP: usize = 200;
+
 /// What is fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct Terms {
@@ -77,7 +84,13 @@ pub fn fit_to_original<S: EdgeStore>(
     surface: &mut Surface<S>,
     arrays: Arrays,
     terms: &Terms,
-) -> usize {
+    meter: &mut Meter,
+) -> progress::Result<usize> {
+    let (left, of_original) = (surface.mesh.face_count(), arrays.triangles.len());
+    let is_light = left * LIGHT > of_original;
+    let sweeps = if is_light { SWEEPS - 1 } else { SWEEPS };
+    let expected = FINDING * of_original + sweeps * STEP * left / 2 + FINDING * left;
+    meter.begin(Stage::Fit, super::FIT, expected)?;
     let grid = Grid::over(arrays.positions, 0.0);
     let original = Original::new(
         arrays,
@@ -85,16 +98,16 @@ pub fn fit_to_original<S: EdgeStore>(
         surface.geometry.scale(),
         terms.target,
         terms.with_boundary,
-    );
+        meter,
+    )?;
     let faces: Vec<u32> = surface.mesh.faces().map(|f| f.index() as u32).collect();
-    let cells = Cells::new(grid, faces.len(), |i| {
+    let corners = |i: usize| {
         let f = FaceId::new(faces[i] as usize);
         let corners = surface.mesh.face_vertices(f);
         corners.map(|v| surface.geometry.position(v))
-    });
-    let vertices = in_morton_order(surface, &grid);
-    let is_light = faces.len() * LIGHT > original.len();
-    let sweeps = if is_light { SWEEPS - 1 } else { SWEEPS };
+    };
+    let cells = Cells::new(grid, faces.len(), corners, meter)?;
+    let vertices = in_morton_order(surface, &grid, meter)?;
     let pieces = pieces(&vertices, |v| {
         original.cells.before(surface.geometry.position(v))
     });
@@ -105,25 +118,30 @@ pub fn fit_to_original<S: EdgeStore>(
     let mut begin = 0;
     for end in pieces {
         let piece = &vertices[begin..end];
-        fit.take_up(piece, &cells, &faces);
-        fit.flip_edges();
+        fit.take_up(piece, &cells, &faces, meter)?;
+        fit.flip_edges(meter)?;
         if terms.moves {
-            (0..sweeps).for_each(|_| fit.move_vertices());
+            (0..sweeps).try_for_each(|_| fit.move_vertices(meter))?;
         }
         fit.put_down();
+        meter.work(piece.len())?;
         begin = end;
     }
     let bytes = sorting.max(held + fit.bytes());
     fit.finish();
-    bytes
+    Ok(bytes)
 }
 
-fn in_morton_order<S: EdgeStore>(surface: &Surface<S>, grid: &Grid) -> Vec<VertexId> {
+fn in_morton_order<S: EdgeStore>(
+    surface: &Surface<S>,
+    grid: &Grid,
+    meter: &mut Meter,
+) -> progress::Result<Vec<VertexId>> {
     let vertices: Vec<VertexId> = surface.mesh.vertices().collect();
     let at = |v: &VertexId| surface.geometry.position(*v);
     let positions: Vec<Vec3> = vertices.iter().map(at).collect();
-    let order = grid.order(&positions);
-    order.into_iter().map(|i| vertices[i as usize]).collect()
+    let order = grid.order_with(&positions, meter)?;
+    Ok(order.into_iter().map(|i| vertices[i as usize]).collect())
 }
 
 /// Where the pieces of a list of vertices end: each takes up about as many faces of the original.

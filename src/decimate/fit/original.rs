@@ -9,6 +9,7 @@ use super::cells::{Cells, Seen};
 use super::measure::ToOriginal;
 use super::{Number, index, number};
 use crate::nearest::{Patch, foot_on_triangle};
+use crate::progress::{self, BLOCK, Meter};
 use crate::spatial::Grid;
 
 /// Faces larger than the mean by this factor squared are sampled in as many rows.
@@ -52,14 +53,15 @@ impl<'a> Original<'a> {
         scale: f64,
         target: usize,
         with_boundary: bool,
-    ) -> Self {
+        meter: &mut Meter,
+    ) -> progress::Result<Self> {
         let Arrays {
             positions,
             triangles,
         } = arrays;
         let corners = |i: usize| triangles[i].map(|v| positions[v as usize]);
         let boundary = if with_boundary {
-            boundary_edges(positions.len(), triangles)
+            boundary_edges(positions.len(), triangles, meter)?
         } else {
             Vec::new()
         };
@@ -70,19 +72,20 @@ impl<'a> Original<'a> {
         let total: f64 = (0..triangles.len())
             .map(|i| f64::from(area(&corners(i).map(|p| scaled(p, scale)))))
             .sum();
+        meter.work(2 * triangles.len())?;
         let largest = positions
             .iter()
             .fold(0.0f32, |m, p| m.max(p.abs().max_element()));
         let noise = (f64::from(largest) * scale * f64::from(f32::EPSILON)) as f32;
-        Self {
-            cells: Cells::new(grid, triangles.len(), corners),
-            boundary_cells: Cells::new(grid, boundary.len(), ends),
+        Ok(Self {
+            cells: Cells::new(grid, triangles.len(), corners, meter)?,
+            boundary_cells: Cells::new(grid, boundary.len(), ends, meter)?,
             boundary,
             typical: total / triangles.len().max(FEWEST).max(ON_A_FACE * target) as f64,
             noise_squared: noise * noise,
             arrays,
             scale,
-        }
+        })
     }
 
     /// The number of faces.
@@ -116,7 +119,11 @@ pub(super) fn area(&[a, b, c]: &[Vec3; 3]) -> f32 {
 /// At a vertex inside, every neighbour stands in two of the triangles around: the exclusive or of
 /// their numbers, each mixed, is zero. So only the triangles at other vertices are looked at in
 /// earnest. Takes 4 bytes a vertex while it runs.
-fn boundary_edges(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+fn boundary_edges(
+    vertices: usize,
+    triangles: &[[u32; 3]],
+    meter: &mut Meter,
+) -> progress::Result<Vec<[u32; 2]>> {
     // Odd, so that numbers mix to different ones (Knuth 1998, vol. 3, 6.4); the high half is folded
     // in, so that no sum of four vanishes by their being neighbours.
     let mixed = |v: u32| {
@@ -124,24 +131,31 @@ fn boundary_edges(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
         (product >> 32) as u32 ^ product as u32
     };
     let mut odd = vec![0u32; vertices];
-    for &[a, b, c] in triangles {
-        let [x, y, z] = [a, b, c].map(mixed);
-        odd[a as usize] ^= y ^ z;
-        odd[b as usize] ^= z ^ x;
-        odd[c as usize] ^= x ^ y;
+    for block in triangles.chunks(BLOCK) {
+        for &[a, b, c] in block {
+            let [x, y, z] = [a, b, c].map(mixed);
+            odd[a as usize] ^= y ^ z;
+            odd[b as usize] ^= z ^ x;
+            odd[c as usize] ^= x ^ y;
+        }
+        meter.work(block.len())?;
     }
     let is_odd = |v: u32| odd[v as usize] != 0;
     let mut edges = Vec::new();
-    for &[a, b, c] in triangles {
-        for [v, w] in [[a, b], [b, c], [c, a]] {
-            if is_odd(v) && is_odd(w) {
-                edges.push([v.min(w), v.max(w)]);
+    for block in triangles.chunks(BLOCK) {
+        for &[a, b, c] in block {
+            for [v, w] in [[a, b], [b, c], [c, a]] {
+                if is_odd(v) && is_odd(w) {
+                    edges.push([v.min(w), v.max(w)]);
+                }
             }
         }
+        meter.work(block.len())?;
     }
     edges.sort_unstable();
+    meter.detour(2 * edges.len())?;
     let alone = edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1);
-    alone.map(|same| same[0]).collect()
+    Ok(alone.map(|same| same[0]).collect())
 }
 
 /// A piece of the original in the unit box: its faces and boundary edges, and samples on both.
@@ -381,6 +395,7 @@ pub(super) fn centroids(&[a, b, c]: &[Vec3; 3], rows: usize) -> impl Iterator<It
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::unheard;
     use crate::shapes;
 
     /// Four triangles: three corners' and the middle one, whose centroid is the whole's.
@@ -401,11 +416,14 @@ mod tests {
     /// The rim of a grid; nothing on a closed shape; three faces on an edge are no boundary.
     #[test]
     fn boundary_edges_have_one_triangle() {
+        let count = |vertices, triangles: &[[u32; 3]]| {
+            unheard(|meter| boundary_edges(vertices, triangles, meter)).len()
+        };
         let (positions, triangles) = shapes::grid(5, 4);
-        assert_eq!(boundary_edges(positions.len(), &triangles).len(), 18);
+        assert_eq!(count(positions.len(), &triangles), 18);
         let (positions, triangles) = shapes::icosphere(2);
-        assert!(boundary_edges(positions.len(), &triangles).is_empty());
+        assert_eq!(count(positions.len(), &triangles), 0);
         let fins = [[0, 1, 2], [1, 0, 3], [0, 1, 4]];
-        assert_eq!(boundary_edges(5, &fins).len(), 6);
+        assert_eq!(count(5, &fins), 6);
     }
 }

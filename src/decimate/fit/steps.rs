@@ -8,10 +8,11 @@ use super::curve::Curve;
 use super::measure::{FaceToOriginal, Measure, Measures, ToOriginal};
 use super::original::{self, Original, area, scaled};
 use super::star::{CurveItem, Fours, Star};
-use super::{MARGIN, Number, WIDEST, index, number};
+use super::{FINDING, LOOK, MARGIN, Number, STEP, WIDEST, index, number};
 use crate::decimate::surface::Surface;
 use crate::mesh::{EdgeId, EdgeStore, FaceId, Opposite, Outgoing, VertexId};
 use crate::nearest::{Faces, GROUP, Near, Patch, Points};
+use crate::progress::{self, Meter};
 
 /// A step may raise the largest distance around it up to this many times the rms of the whole: high
 /// enough not to hinder, low enough to keep the Hausdorff distance. 3 costs 4 % of rms; from 8 on
@@ -56,6 +57,9 @@ const TRUSTED: f32 = 1e-3;
 
 /// Samples that a task of the parallel search takes, and queries of a parallel measuring.
 const BLOCK: usize = 4096;
+
+/// Samples or faces that are looked at between two words about it.
+const AT_A_TIME: usize = 16 * BLOCK;
 
 /// The samples on each face, as lists that share one array.
 #[derive(Default)]
@@ -155,7 +159,13 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
     /// Takes up the piece that has these vertices: finds what of the original lies near, for every
     /// sample the nearest face, and how far every face is from the original. `cells` sorts the faces
     /// listed.
-    pub(super) fn take_up(&mut self, vertices: &[VertexId], cells: &Cells, listed: &[u32]) {
+    pub(super) fn take_up(
+        &mut self,
+        vertices: &[VertexId],
+        cells: &Cells,
+        listed: &[u32],
+        meter: &mut Meter,
+    ) -> progress::Result<()> {
         self.name(vertices);
         let mut seen = std::mem::take(&mut self.seen);
         let mut piece = std::mem::take(&mut self.piece);
@@ -163,19 +173,21 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
         piece.fill(self.original, boxes, &mut seen);
         let near = cells.near(boxes(), &mut seen);
         (self.seen, self.piece) = (seen, piece);
+        meter.detour(4 * self.piece.points.len())?;
         let near = near
             .iter()
             .map(|&i| FaceId::new(listed[i as usize] as usize));
         let others: Vec<FaceId> = near
             .filter(|f| self.place_of_face[f.index()].is_none())
             .collect();
-        self.assign(&others);
-        self.measure_to_original();
+        self.assign(&others, meter)?;
+        self.measure_to_original(meter)?;
         self.allowed = self.total[0] / self.total[1] * (ALLOWED * ALLOWED);
         if let Some(limit) = self.max_error {
             let limit = limit * self.scale;
             self.allowed = self.allowed.min(limit * limit);
         }
+        Ok(())
     }
 
     /// Numbers the vertices and the faces around them.
@@ -240,21 +252,24 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
     /// Those whose nearest face looks the other way lose their weight: the other side of a thin sheet
     /// is nothing to be fitted to, but not to be left farther behind either. (Searching for a face
     /// that looks the same way instead made one mesh 38 times worse.)
-    fn assign(&mut self, others: &[FaceId]) {
+    fn assign(&mut self, others: &[FaceId], meter: &mut Meter) -> progress::Result<()> {
         let all: Vec<FaceId> = self.faces.iter().chain(others).copied().collect();
         let set = Patch::new(all.iter().map(|&f| self.triangle(f)));
         let begin = self.piece.boundary_begin;
-        let owners: Vec<(Near, bool)> = self.piece.points[..begin]
-            .par_chunks(BLOCK)
-            .zip(self.piece.normals[..begin].par_chunks(BLOCK))
-            .flat_map_iter(|(points, normals)| {
+        let mut owners: Vec<(Near, bool)> = Vec::with_capacity(begin);
+        let points = self.piece.points[..begin].chunks(AT_A_TIME);
+        for (points, normals) in points.zip(self.piece.normals[..begin].chunks(AT_A_TIME)) {
+            let blocks = points.par_chunks(BLOCK).zip(normals.par_chunks(BLOCK));
+            owners.par_extend(blocks.flat_map_iter(|(points, normals)| {
                 let near = nearest_of_all(&set, points);
                 near.into_iter().zip(normals).map(|(near, normal)| {
                     let [a, b, c] = set.corners(near.triangle);
                     (near, (b - a).cross(c - a).dot(*normal) < 0.0)
                 })
-            })
-            .collect();
+            }));
+            // About one and a half samples a face.
+            meter.work(FINDING * points.len() * 2 / 3)?;
+        }
         self.lists.clear(self.faces.len(), self.piece.points.len());
         self.assign_boundary(&all);
         for (i, (near, is_across)) in owners.into_iter().enumerate().rev() {
@@ -269,6 +284,7 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
             self.total[1] += weight;
             self.lists.push(near.triangle as usize, i);
         }
+        Ok(())
     }
 
     /// A sample of the boundary belongs to a face at the nearest boundary edge.
@@ -302,17 +318,20 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
         }
     }
 
-    fn measure_to_original(&mut self) {
+    fn measure_to_original(&mut self, meter: &mut Meter) -> progress::Result<()> {
         let this = &*self;
-        let to_original: Vec<FaceToOriginal> = (0..this.faces.len())
-            .into_par_iter()
-            .with_min_len(BLOCK)
-            .map(|place| {
+        let count = this.faces.len();
+        let mut to_original: Vec<FaceToOriginal> = Vec::with_capacity(count);
+        for first in (0..count).step_by(AT_A_TIME) {
+            let last = count.min(first + AT_A_TIME);
+            let places = (first..last).into_par_iter().with_min_len(BLOCK);
+            to_original.par_extend(places.map(|place| {
                 let from = this.face_of_original_at(place);
                 let triangle = this.triangle(this.faces[place]);
                 this.face_near(&triangle, from)
-            })
-            .collect();
+            }));
+            meter.work(FINDING * (last - first))?;
+        }
         let mut corners = vec![(None, 0.0); self.vertices.len()];
         for (&f, to_original) in self.faces.iter().zip(&to_original) {
             let trusted = TRUSTED * area(&self.triangle(f));
@@ -332,6 +351,7 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
             self.total[0] += weight * f64::from(to_original.mean);
             self.total[1] += weight;
         }
+        Ok(())
     }
 
     /// A face of the original near a face of the piece, by the samples on it or beside it.
@@ -357,10 +377,12 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
     }
 
     /// Moves each vertex once, if there is a better place for it.
-    pub(super) fn move_vertices(&mut self) {
+    pub(super) fn move_vertices(&mut self, meter: &mut Meter) -> progress::Result<()> {
         for v in 0..self.own {
             self.move_vertex(self.vertices[v]);
+            meter.work(STEP)?;
         }
+        Ok(())
     }
 
     fn move_vertex(&mut self, v: VertexId) {
@@ -542,8 +564,9 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
     }
 
     /// Flips each edge of the piece once, if the other diagonal is nearer to the original.
-    pub(super) fn flip_edges(&mut self) {
+    pub(super) fn flip_edges(&mut self, meter: &mut Meter) -> progress::Result<()> {
         for place in 0..self.faces.len() {
+            meter.detour(3 * LOOK)?;
             for e in self.faces[place].edges() {
                 if let Some(o) = self.surface.mesh.mate(e).filter(|&o| e < o)
                     && self.place_of_face[o.face().index()].is_some()
@@ -552,6 +575,7 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
                 }
             }
         }
+        Ok(())
     }
 
     fn flip_edge(&mut self, e: EdgeId, o: EdgeId) {

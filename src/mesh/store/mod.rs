@@ -62,6 +62,8 @@ impl Tier {
 }
 
 /// The words of all directed edges in one tier. Triangle `i` owns the edges 3i, 3i+1, 3i+2.
+///
+/// Only the three tiers are stores: the words that cross this trait have no name outside.
 pub trait EdgeStore: Clone + Send + Sync + Sized {
     /// The tier that this store is.
     const TIER: Tier;
