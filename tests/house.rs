@@ -55,11 +55,12 @@ const ARROWS: [(&str, &[&str]); 13] = [
 const COMMAND: [&str; 3] = ["main.rs", "cli.rs", "text.rs"];
 
 /// Tests and their shapes: a file here is allowed everything, and its `mod` must be `cfg(test)`.
-const TEST_FILES: [&str; 5] = [
+const TEST_FILES: [&str; 6] = [
     "shapes.rs",
     "mesh/tests.rs",
     "mesh/modify_tests.rs",
     "decimate/tests.rs",
+    "decimate/attribute_tests.rs",
     "structures/tests.rs",
 ];
 

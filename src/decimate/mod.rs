@@ -454,4 +454,6 @@ const COST_UNITS: usize = 4 + greedy::EVALUATION;
 const STUCK: f64 = 0.98;
 
 #[cfg(test)]
+mod attribute_tests;
+#[cfg(test)]
 mod tests;
