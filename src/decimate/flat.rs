@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Room};
 use super::surface::Surface;
 use crate::indexed_mesh::Parts;
 use crate::mesh::{Compaction, EdgeStore, FaceId, Mesh};
@@ -141,12 +141,12 @@ impl<V> Flat<V> {
 
     /// The surface of these arrays over a mesh built from their triangles, and the states.
     ///
-    /// `scale` is the one of the whole. `turned` says which faces were turned round for the mesh. A
+    /// `room` is the one of the whole. `turned` says which faces were turned round for the mesh. A
     /// turned face must have no crease.
     pub fn into_surface<S: EdgeStore>(
         self,
         mesh: Mesh<S>,
-        scale: f64,
+        room: Room,
         turned: &[bool],
     ) -> (Surface<S>, Vec<V>) {
         let faces = mesh.face_slots();
@@ -167,7 +167,7 @@ impl<V> Flat<V> {
             deviation,
             lost: 0.0,
             turned: was_turned,
-            geometry: Geometry::new(self.positions, scale),
+            geometry: Geometry::new(self.positions, room),
             mesh,
             seam: Vec::new(),
         };

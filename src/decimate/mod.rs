@@ -33,7 +33,7 @@ use chunked::Chunked;
 use cost::{Accumulated, Cost, Memoryless};
 use fit::{Arrays, Terms, fit_to_original};
 use flat::Flat;
-use geometry::scale_to_unit;
+use geometry::Room;
 use greedy::{Greedy, Stop};
 use surface::Surface;
 
@@ -53,7 +53,8 @@ pub struct Progress {
 ///
 /// The mesh is cleaned first (see [`clean`]); then the cheapest edge is collapsed, again and again.
 /// Topology is kept: closed stays closed; components, boundary loops and the Euler characteristic
-/// stay; nothing non-manifold is born; no face turns by more than 90°. Where the mesh has
+/// stay; nothing non-manifold is born; no face turns by more than 90°; no vertex leaves the box of
+/// the cleaned mesh, grown by a tenth of its diagonal. Where the mesh has
 /// [weights](IndexedMesh::weights), they multiply what a collapse costs; only their ratios count, and
 /// an infinite one keeps its vertex, bit for bit. The result carries none. It depends on the
 /// mesh and the options alone, not on the tier or the number of threads.
@@ -151,14 +152,17 @@ fn run<S: EdgeStore, C: Cost<S>>(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<IndexedMesh> {
     let start = Instant::now();
-    let scale = scale_to_unit(input.diagonal());
+    let corners = input.bounds().map(|(min, max)| [min, max]);
+    let mut corners = corners.unwrap_or_default();
+    let scale = Room::around(corners).scale();
     let parts = input.into_parts();
     let origin = parts.origin;
     let mut flat = Flat::<C::State>::of(parts);
     // Single precision has no room for the scale of a tiny mesh, and takes a larger one exactly.
     let unit = if scale > MODERATE { scale } else { 1.0 };
     rescale(&mut flat.positions, unit);
-    let scale_of_unit = scale / unit;
+    rescale(&mut corners, unit);
+    let room = Room::around(corners);
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),
@@ -186,7 +190,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let mut chunked = Chunked {
         options,
         stop,
-        scale: scale_of_unit,
+        room,
         progress: job.progress,
     };
     if chunked.is_worthwhile(&flat) {
@@ -194,12 +198,12 @@ fn run<S: EdgeStore, C: Cost<S>>(
             options.boundary == Boundary::Lock || options.feature_angle_degrees.is_some();
         is_prepared = needs_whole;
         if needs_whole {
-            flat = prepared(flat, options, scale_of_unit, report);
+            flat = prepared(flat, options, room, report);
         }
         let mut done = chunked.reduce::<S, C>(&mut flat)?;
         if done.is_disoriented {
             is_prepared = true;
-            flat = prepared(flat, options, scale_of_unit, report);
+            flat = prepared(flat, options, room, report);
             done = chunked.reduce::<S, C>(&mut flat)?;
         }
         if !is_prepared {
@@ -216,7 +220,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let start = Instant::now();
     let Oriented { mesh, flipped, .. } =
         Mesh::<S>::oriented(flat.positions.len(), std::mem::take(&mut flat.triangles));
-    let (mut surface, states) = flat.into_surface(mesh, scale_of_unit, &flipped);
+    let (mut surface, states) = flat.into_surface(mesh, room, &flipped);
     report.mesh_bytes = surface.mesh_bytes();
     if report.chunk_rounds == 0 {
         report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
@@ -281,10 +285,10 @@ fn rescale(positions: &mut [Vec3], factor: f64) {
 }
 
 /// The arrays, oriented, with what only the whole can tell: what is locked, and the creases.
-fn prepared<V>(mut flat: Flat<V>, options: &Options, scale: f64, report: &mut Report) -> Flat<V> {
+fn prepared<V>(mut flat: Flat<V>, options: &Options, room: Room, report: &mut Report) -> Flat<V> {
     let triangles = std::mem::take(&mut flat.triangles);
     let oriented = Mesh::<Small>::oriented(flat.positions.len(), triangles);
-    let (mut surface, _) = flat.into_surface(oriented.mesh, scale, &oriented.flipped);
+    let (mut surface, _) = flat.into_surface(oriented.mesh, room, &oriented.flipped);
     report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
     report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
     surface.prepare(options);
