@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use super::cost::Cost;
 use super::cut::Cut;
 use super::flat::{FaceFlags, Flat};
+use super::geometry::Room;
 use super::greedy::{EVALUATION, Greedy, Halt, Stop};
 use super::options::{Chunks, Options, Topology};
 use super::queue::Buckets;
@@ -149,8 +150,8 @@ pub struct Chunked<'a> {
     pub options: &'a Options,
     /// The target of the whole; `max_cost` is not looked at.
     pub stop: Stop,
-    /// The scale of the whole.
-    pub scale: f64,
+    /// The room of the whole.
+    pub room: Room,
 }
 
 /// What decimation in chunks did.
@@ -241,8 +242,8 @@ impl Chunked<'_> {
         let mut triangles = flat.triangle_count();
         let mut outcomes: Vec<Option<Outcome<C::State>>> = Vec::new();
         outcomes.resize_with(cut.len(), || None);
-        let (options, scale, stop) = (self.options, self.scale, self.stop);
-        let begin = |chunk| Chunk::<S, C>::begin(options, scale, flat, &cut, chunk, is_first);
+        let (options, room, stop) = (self.options, self.room, self.stop);
+        let begin = |chunk| Chunk::<S, C>::begin(options, room, flat, &cut, chunk, is_first);
         let at_a_time = (BATCH_OF_THREAD * rayon::current_num_threads()).min(BATCH);
         let max_cost = match until {
             Until::Cost(max_cost) => max_cost,
@@ -313,7 +314,7 @@ impl Chunked<'_> {
         done.note_bytes(left + cut.bytes());
         let non_manifold_edges = assemble::<S, C>(
             self.options,
-            self.scale,
+            self.room,
             flat,
             &cut,
             outcomes,
@@ -509,7 +510,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
     /// Builds the mesh of a chunk and queues its edges; on any thread, so that nobody is told.
     fn begin(
         options: &Options,
-        scale: f64,
+        room: Room,
         flat: &Flat<C::State>,
         cut: &Cut,
         chunk: usize,
@@ -560,7 +561,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         };
         let mesh = Mesh::<S>::from_triangles(vertices.len(), &triangles);
         drop(triangles);
-        let (mut surface, states) = gathered.into_surface(mesh, scale, &[]);
+        let (mut surface, states) = gathered.into_surface(mesh, room, &[]);
         surface.seam = (0..vertices.len())
             .map(|v| v >= own || cut.is_shared(begin + v))
             .collect();
@@ -726,7 +727,7 @@ fn singular<S: EdgeStore>(surface: &Surface<S>, vertices: &[u32]) -> Singular {
 /// the whole had, in the first round. Told to a meter: a unit a triangle that is left.
 fn assemble<S: EdgeStore, C: Cost<S>>(
     options: &Options,
-    scale: f64,
+    room: Room,
     flat: &mut Flat<C::State>,
     cut: &Cut,
     mut outcomes: Vec<Outcome<C::State>>,
@@ -789,7 +790,7 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
         .filter(is_singular)
         .flat_map(|edge| {
             let [a, b] = edge[0].ends();
-            let [p, q] = [a, b].map(|v| flat.positions[v as usize].as_dvec3() * scale);
+            let [p, q] = [a, b].map(|v| flat.positions[v as usize].as_dvec3() * room.scale());
             [a, b].map(|v| {
                 (
                     renamed[v as usize],

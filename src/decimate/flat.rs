@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Room};
 use super::surface::Surface;
 use super::wedges::FlatWedges;
 use crate::indexed_mesh::Parts;
@@ -145,12 +145,12 @@ impl<V> Flat<V> {
 
     /// The surface of these arrays over a mesh built from their triangles, and the states.
     ///
-    /// `scale` is the one of the whole. `turned` says which faces were turned round for the mesh. A
+    /// `room` is the one of the whole. `turned` says which faces were turned round for the mesh. A
     /// turned face must have no crease.
     pub fn into_surface<S: EdgeStore>(
         self,
         mesh: Mesh<S>,
-        scale: f64,
+        room: Room,
         turned: &[bool],
     ) -> (Surface<S>, Vec<V>) {
         let faces = mesh.face_slots();
@@ -171,7 +171,7 @@ impl<V> Flat<V> {
             deviation,
             lost: 0.0,
             turned: was_turned,
-            geometry: Geometry::new(self.positions, scale),
+            geometry: Geometry::new(self.positions, room),
             wedges: self.wedges.into_wedges(&mesh, turned),
             mesh,
             seam: Vec::new(),

@@ -1,22 +1,66 @@
-//! Where the vertices are, and the unit box in which costs are evaluated.
+//! Where the vertices are, how far they may go, and the unit box in which costs are evaluated.
 
 use glam::{DVec3, Vec3};
 
 use crate::mesh::{EdgeId, EdgeStore, Mesh, VertexId};
 
-/// Positions in the file's bits, and the power of two that brings the mesh into the unit box.
+/// How far outside of the input's box a vertex may go, of the box's diagonal. Where spikes stand on a
+/// sheet, collapses alone would go 34 % out, and with a fit 58 %. On a sphere the corners of 20 faces
+/// lie 6 % out with reason, those of 12 faces 11 to 13 %, those of 8 even 24 %.
+const OUTSIDE_OF_DIAGONAL: f64 = 0.1;
+
+/// The room that an input gives: the power of two that brings its box into the unit box, and the box,
+/// grown, in which all vertices stay.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    scale: f64,
+    min: Vec3,
+    max: Vec3,
+}
+
+impl Room {
+    /// The room of an input with a box between these corners.
+    pub fn around([min, max]: [Vec3; 2]) -> Self {
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        let diagonal = (max - min).length();
+        let outside = DVec3::splat(OUTSIDE_OF_DIAGONAL * diagonal);
+        Self {
+            scale: scale_to_unit(diagonal),
+            min: (min - outside).as_vec3(),
+            max: (max + outside).as_vec3(),
+        }
+    }
+
+    /// Unit-box lengths per model unit: a power of two.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Whether a vertex may be there.
+    #[inline(always)]
+    pub fn contains(&self, p: Vec3) -> bool {
+        p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+}
+
+/// Positions in the file's bits, and the room that they have.
 ///
 /// Differences are taken in `f64`, where they are exact, and then scaled by a power of two, which is
 /// exact too: so a mesh scaled by 2^k decimates to the same triangles.
 pub struct Geometry {
     positions: Vec<Vec3>,
-    scale: f64,
+    room: Room,
 }
 
 impl Geometry {
-    /// The geometry of these positions, at a scale.
-    pub fn new(positions: Vec<Vec3>, scale: f64) -> Self {
-        Self { positions, scale }
+    /// The geometry of these positions, in a room.
+    pub fn new(positions: Vec<Vec3>, room: Room) -> Self {
+        Self { positions, room }
+    }
+
+    /// The room of the whole.
+    pub fn room(&self) -> &Room {
+        &self.room
     }
 
     /// The stored position of `v`.
@@ -42,13 +86,13 @@ impl Geometry {
 
     /// Unit-box lengths per model unit: a power of two.
     pub fn scale(&self) -> f64 {
-        self.scale
+        self.room.scale
     }
 
     /// The vector from a stored position to `v`, in the unit box.
     #[inline(always)]
     pub fn vector(&self, from: Vec3, v: VertexId) -> DVec3 {
-        (self.position(v).as_dvec3() - from.as_dvec3()) * self.scale
+        (self.position(v).as_dvec3() - from.as_dvec3()) * self.room.scale
     }
 
     /// The vector from one vertex to another, in the unit box.
@@ -60,13 +104,13 @@ impl Geometry {
     /// The stored position nearest to `v` plus a vector in the unit box.
     #[inline(always)]
     pub fn point_near(&self, v: VertexId, offset: DVec3) -> Vec3 {
-        (self.position(v).as_dvec3() + offset * self.scale.recip()).as_vec3()
+        (self.position(v).as_dvec3() + offset * self.room.scale.recip()).as_vec3()
     }
 
     /// A difference of positions, in the unit box.
     #[inline(always)]
     pub fn scaled(&self, difference: Vec3) -> Vec3 {
-        difference * self.scale as f32
+        difference * self.room.scale as f32
     }
 
     /// The normal of the face of `e`, twice its area long, in the unit box.
@@ -84,7 +128,7 @@ impl Geometry {
 }
 
 /// The power of two that brings a length into [0.5, 1); 1 for no length.
-pub fn scale_to_unit(length: f64) -> f64 {
+fn scale_to_unit(length: f64) -> f64 {
     if length > 0.0 && length.is_finite() {
         let exponent = (length.to_bits() >> 52) as i64 - 1022;
         f64::from_bits(((1023 - exponent) as u64) << 52)
@@ -96,6 +140,23 @@ pub fn scale_to_unit(length: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A box of 3 × 4 has a diagonal of 5: half a unit is free on each side.
+    #[test]
+    fn a_room_ends_a_tenth_of_the_diagonal_outside_of_the_box() {
+        let room = Room::around([Vec3::new(1.0, 2.0, 7.0), Vec3::new(4.0, 6.0, 7.0)]);
+        assert_eq!(room.scale(), 0.125);
+        for (x, y, z, is_in) in [
+            (2.0, 3.0, 7.0, true),
+            (0.5, 6.5, 7.5, true),
+            (0.49, 3.0, 7.0, false),
+            (2.0, 6.51, 7.0, false),
+            (2.0, 3.0, 6.49, false),
+            (f32::NAN, 3.0, 7.0, false),
+        ] {
+            assert_eq!(room.contains(Vec3::new(x, y, z)), is_in, "{x} {y} {z}");
+        }
+    }
 
     #[test]
     fn the_scale_is_the_power_of_two_that_fits() {

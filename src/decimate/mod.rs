@@ -39,7 +39,7 @@ use chunked::Chunked;
 use cost::{Accumulated, AttributeForms, Cost, Memoryless};
 use fit::{Arrays, Terms, fit_to_original};
 use flat::Flat;
-use geometry::scale_to_unit;
+use geometry::Room;
 use greedy::{Greedy, Stop};
 use surface::Surface;
 use wedges::FlatWedges;
@@ -48,7 +48,8 @@ use wedges::FlatWedges;
 ///
 /// The mesh is cleaned first (see [`clean`](crate::clean::clean)); then the cheapest edge is collapsed, again and again.
 /// Topology is kept: closed stays closed; components, boundary loops and the Euler characteristic
-/// stay; nothing non-manifold is born; no face turns by more than 90°. Where the mesh has
+/// stay; nothing non-manifold is born; no face turns by more than 90°; no vertex leaves the box of
+/// the cleaned mesh, grown by a tenth of its diagonal. Where the mesh has
 /// [weights](IndexedMesh::weights), they multiply what a collapse costs; only their ratios count, and
 /// an infinite one keeps its vertex, bit for bit. The result carries none. It depends on the
 /// mesh and the options alone, not on the tier or the number of threads.
@@ -184,7 +185,9 @@ fn run<S: EdgeStore, C: Cost<S>>(
     meter: &mut Meter,
 ) -> Result<IndexedMesh> {
     let start = Instant::now();
-    let scale = scale_to_unit(input.diagonal());
+    let corners = input.bounds().map(|(min, max)| [min, max]);
+    let mut corners = corners.unwrap_or_default();
+    let scale = Room::around(corners).scale();
     let mut parts = input.into_parts();
     let origin = parts.origin;
     let mut attributes = std::mem::take(&mut parts.attributes);
@@ -203,7 +206,8 @@ fn run<S: EdgeStore, C: Cost<S>>(
     // Single precision has no room for the scale of a tiny mesh, and takes a larger one exactly.
     let unit = if scale > MODERATE { scale } else { 1.0 };
     rescale(&mut flat.positions, unit);
-    let scale_of_unit = scale / unit;
+    rescale(&mut corners, unit);
+    let room = Room::around(corners);
     let stop = Stop {
         triangles: report.target_triangles,
         max_error: options.targets.max_error.map(|e| e * scale),
@@ -221,7 +225,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let chunked = Chunked {
         options,
         stop,
-        scale: scale_of_unit,
+        room,
     };
     if chunked.is_worthwhile(&flat) {
         let needs_whole = options.boundary == Boundary::Lock
@@ -229,7 +233,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
             || !flat.wedges.is_nothing();
         is_prepared = needs_whole;
         if needs_whole {
-            flat = prepared(flat, options, scale_of_unit, report, meter)?;
+            flat = prepared(flat, options, room, report, meter)?;
         }
         let share = match options.quality {
             Quality::Best => CHUNKS_OF_BEST,
@@ -239,7 +243,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
         let mut done = chunked.reduce::<S, C>(&mut flat, meter)?;
         if done.is_disoriented {
             is_prepared = true;
-            flat = prepared(flat, options, scale_of_unit, report, meter)?;
+            flat = prepared(flat, options, room, report, meter)?;
             meter.begin(Stage::Chunks, share, chunked.work(&flat))?;
             done = chunked.reduce::<S, C>(&mut flat, meter)?;
         }
@@ -258,7 +262,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let triangles = std::mem::take(&mut flat.triangles);
     let Oriented { mesh, flipped, .. } =
         Mesh::<S>::oriented_with(flat.positions.len(), triangles, meter)?;
-    let (mut surface, states) = flat.into_surface(mesh, scale_of_unit, &flipped);
+    let (mut surface, states) = flat.into_surface(mesh, room, &flipped);
     meter.work(surface.mesh.face_count())?;
     report.mesh_bytes = surface.mesh_bytes();
     if report.chunk_rounds == 0 {
@@ -337,7 +341,7 @@ fn rescale(positions: &mut [Vec3], factor: f64) {
 fn prepared<V>(
     mut flat: Flat<V>,
     options: &Options,
-    scale: f64,
+    room: Room,
     report: &mut Report,
     meter: &mut Meter,
 ) -> progress::Result<Flat<V>> {
@@ -345,7 +349,7 @@ fn prepared<V>(
     meter.begin(Stage::Build, BUILD, (BUILD_UNITS + 2) * faces)?;
     let triangles = std::mem::take(&mut flat.triangles);
     let oriented = Mesh::<Small>::oriented_with(flat.positions.len(), triangles, meter)?;
-    let (mut surface, _) = flat.into_surface(oriented.mesh, scale, &oriented.flipped);
+    let (mut surface, _) = flat.into_surface(oriented.mesh, room, &oriented.flipped);
     report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
     report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
     meter.work(faces)?;

@@ -71,7 +71,8 @@ pub trait Cost<S: EdgeStore>: Send + Sync + Sized {
     fn evaluate(&self, surface: &Surface<S>, e: EdgeId, held: [bool; 2]) -> Option<Evaluation>;
 
     /// What the collapses of edges of which no end is held cost, about as
-    /// [`evaluate`](Self::evaluate) says; not finite where it says nothing.
+    /// [`evaluate`](Self::evaluate) says, or less where the optimum has no room; not finite where it
+    /// says nothing.
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES];
 
     /// The wedges of the vertex that is left of `e` if it goes to `position`; none where nothing is
@@ -181,7 +182,7 @@ fn between(from: &Vector<Lanes>, to: &Vector<Lanes>, scale: Lanes) -> Vector<Lan
 }
 
 impl Least<f64> {
-    /// The cheapest of both ends and x, of those that may be.
+    /// The cheapest of both ends and x, of those that may be: x in the room.
     #[inline(always)]
     fn evaluation<S: EdgeStore>(
         &self,
@@ -198,13 +199,16 @@ impl Least<f64> {
         };
         let geometry = &surface.geometry;
         let is_free = held == [false; 2] && placement == Placement::Optimal;
-        let (energy, position) = if is_free && self.x_is_better {
-            (self.at_x, geometry.point_near(v, self.x.into()))
-        } else if takes_head {
-            (self.at_head, geometry.position(w))
-        } else {
-            (self.at_tail, geometry.position(v))
-        };
+        let optimum = (is_free && self.x_is_better)
+            .then(|| (self.at_x, geometry.point_near(v, self.x.into())))
+            .filter(|&(_, x)| geometry.room().contains(x));
+        let (energy, position) = optimum.unwrap_or_else(|| {
+            if takes_head {
+                (self.at_head, geometry.position(w))
+            } else {
+                (self.at_tail, geometry.position(v))
+            }
+        });
         let cost = energy.max(0.0) + TIE_BREAK * self.length_squared;
         (cost.is_finite() && position.is_finite()).then_some(Evaluation { cost, position })
     }
@@ -213,18 +217,20 @@ impl Least<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decimate::geometry::{Geometry, scale_to_unit};
+    use crate::decimate::geometry::{Geometry, Room};
 
     /// A surface of nothing but a shape.
     pub(super) fn surface<S: EdgeStore>(shape: (Vec<Vec3>, Vec<[u32; 3]>)) -> Surface<S> {
         let (positions, triangles) = shape;
-        let extent = positions
+        let corners = positions
             .iter()
-            .fold(0.0, |extent, p| p.abs().max_element().max(extent));
+            .fold([Vec3::MAX, Vec3::MIN], |[min, max], &p| {
+                [min.min(p), max.max(p)]
+            });
         Surface {
             mesh: Mesh::from_triangles(positions.len(), &triangles),
             deviation: vec![0.0; positions.len()],
-            geometry: Geometry::new(positions, scale_to_unit(extent.into())),
+            geometry: Geometry::new(positions, Room::around(corners)),
             locked: Vec::new(),
             double_sided: Vec::new(),
             turned: Vec::new(),

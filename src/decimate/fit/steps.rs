@@ -512,11 +512,12 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
         for _ in 0..TRIALS {
             let there = (exactly_here + step).as_vec3();
             step *= 0.5;
-            let position = there.as_dvec3() / self.scale;
-            if !position.as_vec3().is_finite() || there == here {
+            let position = (there.as_dvec3() / self.scale).as_vec3();
+            if !position.is_finite() || there == here {
                 return None;
             }
-            if turns(&star.rim, here, there) {
+            let has_room = self.surface.geometry.room().contains(position);
+            if !has_room || turns(&star.rim, here, there) {
                 continue;
             }
             let mut after = star.measure(there);
