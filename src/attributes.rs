@@ -25,6 +25,11 @@ pub struct Attributes {
     pub face_properties: Vec<Property>,
     /// The material libraries that an OBJ file names (`mtllib`), as it writes them.
     pub material_libraries: Vec<String>,
+    /// The pictures that a PLY file names (`comment TextureFile`), which its face property `texnumber`
+    /// counts.
+    pub textures: Vec<String>,
+    /// What the file held and is not here, in short sentences.
+    pub notices: Vec<String>,
 }
 
 /// One attribute: a few numbers a wedge.
@@ -149,6 +154,15 @@ impl Values {
         }
     }
 
+    /// Makes room for exactly so many more, if there is room for them.
+    pub(crate) fn reserve(&mut self, numbers: usize) {
+        // Without it the list grows as they come.
+        let _ = match self {
+            Self::Singles(list) => list.try_reserve_exact(numbers),
+            Self::Doubles(list) => list.try_reserve_exact(numbers),
+        };
+    }
+
     /// Adds a number.
     pub fn push(&mut self, x: f64) {
         match self {
@@ -231,7 +245,10 @@ pub struct Group {
 impl Attributes {
     /// Whether there is nothing.
     pub fn is_empty(&self) -> bool {
-        self.channels.is_empty() && self.group_of.is_empty() && self.material_libraries.is_empty()
+        self.channels.is_empty()
+            && self.group_of.is_empty()
+            && self.material_libraries.is_empty()
+            && self.textures.is_empty()
     }
 
     /// The number of wedges.

@@ -511,6 +511,14 @@ impl MeshBuilder {
         self.weights.push(weight);
     }
 
+    /// The triangles so far; none where polygons stay whole.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        match &self.faces {
+            Faces::Triangles(list) => list,
+            Faces::Polygons(_) => &[],
+        }
+    }
+
     /// The vertices so far.
     pub fn vertex_count(&self) -> usize {
         self.singles.len().max(self.doubles.len())
@@ -542,7 +550,11 @@ impl MeshBuilder {
         } else if attributes.corners.is_empty() {
             attributes.corners.clone_from(&triangles);
         }
-        let groups = std::mem::take(&mut self.groups);
+        let mut groups = std::mem::take(&mut self.groups);
+        if attributes.groups.is_empty() {
+            // The reader gave them up.
+            groups.clear();
+        }
         let ends = groups.iter().skip(1).map(|&(begin, _)| begin);
         for (&(begin, group), end) in groups.iter().zip(ends.chain([triangles.len()])) {
             // What came before the first is of the first.

@@ -69,7 +69,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
         ascii: args.ascii,
         precision: args.precision.map(usize::from),
     };
-    io::output_format(output, &write_options)?;
+    let output_format = io::output_format(output, &write_options)?;
     io::check_place(output)?;
 
     let start = Instant::now();
@@ -81,6 +81,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     let bar = progress_bar(args.quiet);
     bar.set_message("reading");
     let mesh = io::read(input, &read_options)?;
+    bar.suspend(|| note(args.quiet, &mesh.attributes().notices));
     let read_seconds = start.elapsed().as_secs_f64();
 
     let (mesh, mut report) = decimate_with_progress(mesh, &options, &mut |progress| {
@@ -91,6 +92,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     .map_err(|error| name_mesh(error, input))?;
 
     let start = Instant::now();
+    bar.suspend(|| note(args.quiet, &io::cannot_carry(&mesh, output_format)));
     bar.set_message("writing");
     io::write(output, &mesh, &write_options)?;
     bar.finish_and_clear();
@@ -149,7 +151,8 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
         ascii: args.ascii,
         precision: args.precision.map(usize::from),
     };
-    if io::output_format(output, &write_options)? == Format::Stl {
+    let output_format = io::output_format(output, &write_options)?;
+    if output_format == Format::Stl {
         return Err(Error::InvalidOptions(
             "in STL faces share no vertices, a cut would be lost; ply, obj or off is expected"
                 .into(),
@@ -161,8 +164,10 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
         ..ReadOptions::default()
     };
     let mesh = io::read(input, &read_options)?;
+    note(args.quiet, &mesh.attributes().notices);
     let (mesh, report) =
         repair::cut(mesh, !args.no_weld).map_err(|error| name_mesh(error, input))?;
+    note(args.quiet, &io::cannot_carry(&mesh, output_format));
     io::write(output, &mesh, &write_options)?;
     if let Some(path) = &args.report {
         write_json(path, &report)?;
@@ -176,7 +181,11 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
 fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
     use_threads(args.threads)?;
     let name = |error| name_mesh(error, &args.reference);
-    let read = |path| io::read(path, &ReadOptions::default());
+    let read_options = ReadOptions {
+        attributes: false,
+        ..ReadOptions::default()
+    };
+    let read = |path| io::read(path, &read_options);
     let reference = Reference::new(read(&args.reference)?).map_err(name)?;
     let options = CompareOptions {
         samples: args.samples,
@@ -201,6 +210,13 @@ fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
         })?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Says what a file holds that the mesh or the next file does not.
+fn note(quiet: bool, notices: &[String]) {
+    for notice in notices.iter().filter(|_| !quiet) {
+        eprintln!("note: {notice}");
+    }
 }
 
 /// Refuses a report that would be written where a mesh is, or could not be written at all.

@@ -12,15 +12,21 @@
 //! position, nor the weight asked for, is skipped.
 
 mod blocks;
+mod cannot_carry;
+mod groups;
 mod input;
 mod obj;
+mod obj_output;
 mod off;
 mod output;
 mod ply;
+mod ply_attributes;
 mod ply_binary;
 mod ply_header;
+mod ply_output;
 mod stl;
 mod text;
+mod wedges;
 
 use std::fmt;
 use std::io::{Read, Write};
@@ -30,6 +36,7 @@ use std::str::FromStr;
 use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder, PolygonMesh};
 
+pub use cannot_carry::cannot_carry;
 pub use output::{Abandoned, abandon_unfinished, check_place, write_file};
 
 use input::Input;
@@ -169,7 +176,11 @@ pub fn read_from(
 /// As [`read`].
 pub fn read_polygons(path: &Path, options: &ReadOptions) -> Result<PolygonMesh> {
     let mut builder = MeshBuilder::of_polygons();
-    read_into(open(path)?, options, &mut builder)?;
+    let options = ReadOptions {
+        attributes: false,
+        ..options.clone()
+    };
+    read_into(open(path)?, &options, &mut builder)?;
     builder.finish_polygons()
 }
 
@@ -198,9 +209,16 @@ fn read_into(input: Input, options: &ReadOptions, builder: &mut MeshBuilder) -> 
             "ply, where a vertex weight is asked for",
         ));
     }
+    let attributes = options.attributes;
     match format {
-        Format::Ply => ply::read(input, vertex_weight, builder),
-        Format::Obj => obj::read(input, builder),
+        Format::Ply => {
+            let wanted = ply::Wanted {
+                vertex_weight,
+                attributes,
+            };
+            ply::read(input, wanted, builder)
+        }
+        Format::Obj => obj::read(input, attributes, builder),
         Format::Stl => stl::read(input, builder),
         Format::Off => off::read(input, builder),
     }
@@ -285,7 +303,7 @@ fn write_as(
     match format {
         Format::Ply if options.ascii => output::ply_ascii(writer, mesh, options.precision),
         Format::Ply => output::ply_binary(writer, mesh),
-        Format::Obj => output::obj(writer, mesh, options.precision),
+        Format::Obj => obj_output::obj(writer, mesh, options.precision),
         Format::Stl if options.ascii => output::stl_ascii(writer, mesh, options.precision),
         Format::Stl => output::stl_binary(writer, mesh),
         Format::Off => output::off(writer, mesh, options.precision),

@@ -1,4 +1,4 @@
-//! Writing: the file beside that takes its place when it is whole, and the four formats.
+//! Writing: the file beside that takes its place when it is whole, and the formats but OBJ.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -8,10 +8,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
 
+use super::ply_output;
 use super::text::write_number;
 
 /// How much is written at a time.
-const BLOCK_BYTES: usize = 1 << 20;
+pub(super) const BLOCK_BYTES: usize = 1 << 20;
 
 /// Has `write` fill the file at `path`, or standard output where that is `-`: under another name
 /// beside its place, renamed when it is complete.
@@ -176,13 +177,13 @@ impl Drop for Beside {
 /// The scalar type that holds a mesh's coordinates: without an origin of its own a mesh is single
 /// precision, and leaves with the bits it came with.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Scalar {
+pub(super) enum Scalar {
     Float,
     Double,
 }
 
 impl Scalar {
-    fn of(mesh: &IndexedMesh) -> Scalar {
+    pub fn of(mesh: &IndexedMesh) -> Scalar {
         if mesh.origin().to_array() == [0.0; 3] {
             Scalar::Float
         } else {
@@ -192,7 +193,7 @@ impl Scalar {
 }
 
 /// A vertex in the file's coordinates. Adding an origin of zero would turn −0 into 0.
-fn point(mesh: &IndexedMesh, v: usize) -> [f64; 3] {
+pub(super) fn point(mesh: &IndexedMesh, v: usize) -> [f64; 3] {
     let position = mesh.positions()[v].as_dvec3();
     match Scalar::of(mesh) {
         Scalar::Float => position.to_array(),
@@ -201,7 +202,7 @@ fn point(mesh: &IndexedMesh, v: usize) -> [f64; 3] {
 }
 
 /// Writes a vertex as text, its coordinates with blanks between.
-fn write_point(
+pub(super) fn write_point(
     writer: &mut dyn Write,
     mesh: &IndexedMesh,
     v: usize,
@@ -233,6 +234,9 @@ fn ply_header(writer: &mut dyn Write, mesh: &IndexedMesh, encoding: &str) -> io:
 
 /// Binary little-endian PLY.
 pub(super) fn ply_binary(writer: &mut dyn Write, mesh: &IndexedMesh) -> io::Result<()> {
+    if !mesh.attributes().is_empty() {
+        return ply_output::ply(writer, mesh, None);
+    }
     ply_header(writer, mesh, "binary_little_endian")?;
     match Scalar::of(mesh) {
         Scalar::Float => write_records(
@@ -294,6 +298,9 @@ pub(super) fn ply_ascii(
     mesh: &IndexedMesh,
     digits: Option<usize>,
 ) -> io::Result<()> {
+    if !mesh.attributes().is_empty() {
+        return ply_output::ply(writer, mesh, Some(digits));
+    }
     ply_header(writer, mesh, "ascii")?;
     write_counted_lists(writer, mesh, digits)
 }
@@ -325,24 +332,6 @@ fn write_counted_lists(
     }
     for [a, b, c] in mesh.sides() {
         writeln!(writer, "3 {a} {b} {c}")?;
-    }
-    Ok(())
-}
-
-/// Wavefront OBJ.
-pub(super) fn obj(
-    writer: &mut dyn Write,
-    mesh: &IndexedMesh,
-    digits: Option<usize>,
-) -> io::Result<()> {
-    for v in 0..mesh.positions().len() {
-        writer.write_all(b"v ")?;
-        write_point(writer, mesh, v, digits)?;
-        writer.write_all(b"\n")?;
-    }
-    for [a, b, c] in mesh.sides() {
-        let from_one = |v| u64::from(v) + 1;
-        writeln!(writer, "f {} {} {}", from_one(a), from_one(b), from_one(c))?;
     }
     Ok(())
 }

@@ -4,39 +4,72 @@
 use std::io::{self, ErrorKind};
 
 use ply_rs_bw::parser::{ParseError, Parser};
-use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyDef, PropertyType,
+};
 
 use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::MeshBuilder;
 
 use super::blocks::Blocks;
 use super::input::Input;
+use super::ply_attributes::{Carried, FaceAttributes};
 use super::ply_binary::{Decoder, Plain};
-use super::ply_header::{self, AXES, CORNERS, Role, WEIGHT};
+use super::ply_header::{self, AXES, CORNERS, Header, Role, TEXTURE_COORDINATES, WEIGHT};
 use super::text::{Lines, parse_number, quote, words};
 
-/// Reads a PLY file into a mesh: vertices, faces, triangle strips, and the vertex property that is asked for as
-/// weight. Other elements and properties are skipped.
-pub(super) fn read(
-    input: Input,
-    vertex_weight: Option<&str>,
-    builder: &mut MeshBuilder,
-) -> Result<()> {
-    read_with(input, vertex_weight, Plain::of, builder)
+/// What a PLY file is asked for beside positions and faces.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    /// The vertex property that becomes the weight, and is no attribute then.
+    pub vertex_weight: Option<&'a str>,
+    pub attributes: bool,
+}
+
+/// Reads a PLY file into a mesh: vertices, faces, triangle strips, and what is asked for.
+pub(super) fn read(input: Input, wanted: Wanted, builder: &mut MeshBuilder) -> Result<()> {
+    read_with(input, wanted, Plain::of, builder)
 }
 
 /// Reads a PLY file in which `plain` finds the layouts of binary elements that are plain.
 pub(super) fn read_with(
     mut input: Input,
-    vertex_weight: Option<&str>,
-    plain: impl Fn(&ElementDef, Option<&str>) -> Option<Plain>,
+    wanted: Wanted,
+    plain: impl Fn(&ElementDef, Option<&str>, &Carried) -> Option<Plain>,
     builder: &mut MeshBuilder,
 ) -> Result<()> {
-    let header = ply_header::read(&mut input, vertex_weight)?;
+    let mut header = ply_header::read(&mut input, wanted.vertex_weight)?;
+    let attributes = builder.attributes();
+    let carried = if wanted.attributes {
+        Carried::of(&mut header, attributes)
+    } else {
+        Carried::default()
+    };
+    let faces = FaceAttributes::of(&mut header, &carried, attributes);
     let mut sink = Sink {
         builder,
         vertices: header.vertices(),
+        faces,
     };
+    if carried.is_empty() {
+        read_elements::<false>(input, &header, wanted, plain, &carried, &mut sink)
+    } else {
+        read_elements::<true>(input, &header, wanted, plain, &carried, &mut sink)?;
+        sink.faces.finish(sink.builder);
+        Ok(())
+    }
+}
+
+/// Reads the elements behind the header, with numbers beside positions only where it `CARRIES` some.
+fn read_elements<const CARRIES: bool>(
+    input: Input,
+    header: &Header,
+    wanted: Wanted,
+    plain: impl Fn(&ElementDef, Option<&str>, &Carried) -> Option<Plain>,
+    carried: &Carried,
+    sink: &mut Sink,
+) -> Result<()> {
+    let vertex_weight = wanted.vertex_weight;
     let body = match header.encoding {
         Encoding::Ascii => Body::Ascii(Lines::after(input, header.lines)),
         encoding => Body::Binary {
@@ -44,7 +77,7 @@ pub(super) fn read_with(
             blocks: Blocks::after(input, header.bytes),
         },
     };
-    let mut reader = ElementReader {
+    let mut reader = ElementReader::<CARRIES> {
         parser: Parser::new(),
         body,
         start: 0,
@@ -56,9 +89,8 @@ pub(super) fn read_with(
         .filter(|def| !def.properties.is_empty())
     {
         if let Body::Binary { big, blocks } = &mut reader.body
-            && let Some(plain) = plain(def, vertex_weight)
+            && let Some(plain) = plain(def, vertex_weight, carried)
         {
-            let sink = &mut sink;
             let mut decoder = Decoder { def, blocks, sink };
             if *big {
                 decoder.read::<true>(&plain)?;
@@ -66,7 +98,7 @@ pub(super) fn read_with(
                 decoder.read::<false>(&plain)?;
             }
         } else {
-            reader.read_all(def, &mut sink, vertex_weight)?;
+            reader.read_all(def, sink, vertex_weight, carried)?;
         }
     }
     Ok(())
@@ -77,6 +109,7 @@ pub(super) struct Sink<'a> {
     pub builder: &'a mut MeshBuilder,
     /// How many the header promises.
     pub vertices: usize,
+    pub faces: FaceAttributes,
 }
 
 impl Sink<'_> {
@@ -84,6 +117,21 @@ impl Sink<'_> {
     pub fn push_weight(&mut self, weight: f64) -> std::result::Result<(), f64> {
         self.builder.push_weight(single(weight).ok_or(weight)?);
         Ok(())
+    }
+
+    /// Takes what the next vertex carries: `number` gives its properties by their numbers.
+    pub fn push_values(&mut self, carried: &Carried, number: impl Fn(usize) -> f64) {
+        let channels = &mut self.builder.attributes().channels;
+        for (channel, properties) in channels.iter_mut().zip(&carried.channels) {
+            properties
+                .iter()
+                .for_each(|&i| channel.values.push(number(i)));
+        }
+    }
+
+    /// Adds a face with the values that tell its group and the list of its texture coordinates.
+    pub fn push_face(&mut self, corners: &[u32], values: &[f64], list: &[f64]) {
+        self.faces.push_face(corners, values, list, self.builder);
     }
 
     /// A vertex number, if there is such a vertex.
@@ -175,30 +223,33 @@ fn push_strips(builder: &mut MeshBuilder, corners: &[u32]) {
 
 /// What the mesh takes from one element.
 #[derive(Default)]
-struct Element {
+struct Element<const CARRIES: bool> {
     position: [f64; 3],
     weight: f64,
     list: Option<Property>,
+    /// If it carries any: all other numbers, in their order.
+    numbers: Vec<f64>,
+    texture_coordinates: Vec<f64>,
 }
 
-impl PropertyAccess for Element {
+impl<const CARRIES: bool> PropertyAccess for Element<CARRIES> {
     fn new() -> Self {
         Self::default()
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let number = match name {
-            "x" => &mut self.position[0],
-            "y" => &mut self.position[1],
-            "z" => &mut self.position[2],
-            WEIGHT => &mut self.weight,
+        match name {
             CORNERS => {
                 self.list = Some(property);
                 return PropertyAccessResult::Set;
             }
-            _ => return PropertyAccessResult::Ignored,
-        };
-        *number = match property {
+            TEXTURE_COORDINATES if CARRIES => {
+                self.texture_coordinates = numbers_of(property);
+                return PropertyAccessResult::Set;
+            }
+            _ => {}
+        }
+        let number = match property {
             Property::Char(x) => x.into(),
             Property::UChar(x) => x.into(),
             Property::Short(x) => x.into(),
@@ -209,11 +260,50 @@ impl PropertyAccess for Element {
             Property::Double(x) => x,
             _ => return PropertyAccessResult::Ignored,
         };
+        match name {
+            "x" => self.position[0] = number,
+            "y" => self.position[1] = number,
+            "z" => self.position[2] = number,
+            WEIGHT => self.weight = number,
+            _ if CARRIES => self.numbers.push(number),
+            _ => return PropertyAccessResult::Ignored,
+        }
         PropertyAccessResult::Set
     }
 }
 
-impl Element {
+/// The numbers of a list.
+fn numbers_of(property: Property) -> Vec<f64> {
+    fn all<T: Into<f64>>(list: Vec<T>) -> Vec<f64> {
+        list.into_iter().map(Into::into).collect()
+    }
+    match property {
+        Property::ListChar(list) => all(list),
+        Property::ListUChar(list) => all(list),
+        Property::ListShort(list) => all(list),
+        Property::ListUShort(list) => all(list),
+        Property::ListInt(list) => all(list),
+        Property::ListUInt(list) => all(list),
+        Property::ListFloat(list) => all(list),
+        Property::ListDouble(list) => list,
+        _ => Vec::new(),
+    }
+}
+
+/// Which of [`Element::numbers`] each property of `def` is, by its number; of no meaning for others.
+fn places_of_numbers(def: &ElementDef) -> Vec<usize> {
+    let mut next = 0;
+    let place = |(name, property): (&String, &PropertyDef)| {
+        let is_number = matches!(property.data_type, PropertyType::Scalar(_));
+        let is_other = !AXES.contains(&name.as_str()) && name != WEIGHT;
+        let place = next;
+        next += usize::from(is_number && is_other);
+        place
+    };
+    def.properties.iter().map(place).collect()
+}
+
+impl<const CARRIES: bool> Element<CARRIES> {
     /// The weight of a vertex, read from the property of this name in the file.
     fn weight(&self, property: &str) -> f64 {
         let axis = AXES.into_iter().position(|axis| axis == property);
@@ -255,24 +345,27 @@ enum Body {
     },
 }
 
-struct ElementReader {
-    parser: Parser<Element>,
+struct ElementReader<const CARRIES: bool> {
+    parser: Parser<Element<CARRIES>>,
     body: Body,
     /// The byte of a binary file where the last element began.
     start: u64,
 }
 
-impl ElementReader {
+impl<const CARRIES: bool> ElementReader<CARRIES> {
     /// Takes all elements that `def` defines into the mesh.
     fn read_all(
         &mut self,
         def: &ElementDef,
         sink: &mut Sink,
         vertex_weight: Option<&str>,
+        carried: &Carried,
     ) -> Result<()> {
         let role = Role::of(def);
         let vertices = sink.vertices;
         let mut corners = Vec::new();
+        let mut values = Vec::new();
+        let places = places_of_numbers(def);
         for i in 0..def.count {
             let element = self.next(def, i)?;
             let fault = |fault: Fault| {
@@ -285,6 +378,9 @@ impl ElementReader {
                         let pushed = sink.push_weight(element.weight(property));
                         pushed.map_err(|weight| fault(Fault::Weight(weight)))?;
                     }
+                    if CARRIES {
+                        sink.push_values(carried, |i| element.numbers[places[i]]);
+                    }
                     if single {
                         let position = element.position.map(|x| x as f32);
                         sink.builder.push_single(position);
@@ -296,7 +392,14 @@ impl ElementReader {
                     element
                         .corners(&mut corners, |v| sink.corner(v))
                         .map_err(fault)?;
-                    sink.builder.push_polygon(&corners);
+                    if CARRIES {
+                        values.clear();
+                        let groups = carried.groups.iter();
+                        values.extend(groups.map(|&i| element.numbers[places[i]]));
+                        sink.push_face(&corners, &values, &element.texture_coordinates);
+                    } else {
+                        sink.builder.push_polygon(&corners);
+                    }
                 }
                 Role::Strips => {
                     let corner = |v| match v {
@@ -313,7 +416,7 @@ impl ElementReader {
     }
 
     /// Element `i` of those that `def` defines.
-    fn next(&mut self, def: &ElementDef, i: usize) -> Result<Element> {
+    fn next(&mut self, def: &ElementDef, i: usize) -> Result<Element<CARRIES>> {
         match &mut self.body {
             Body::Ascii(lines) => {
                 while lines.advance()? {
@@ -351,7 +454,11 @@ impl ElementReader {
 }
 
 /// Parses one line of an ASCII file.
-fn parse_line(parser: &Parser<Element>, lines: &Lines, def: &ElementDef) -> Result<Element> {
+fn parse_line<const CARRIES: bool>(
+    parser: &Parser<Element<CARRIES>>,
+    lines: &Lines,
+    def: &ElementDef,
+) -> Result<Element<CARRIES>> {
     let parse = |line: &str| parser.read_ascii_element(line, def).ok();
     std::str::from_utf8(lines.line())
         .ok()
@@ -366,7 +473,10 @@ fn parse_line(parser: &Parser<Element>, lines: &Lines, def: &ElementDef) -> Resu
 
 /// Parses a line with numbers that ply-rs-bw does not know. Among them is NaN, which nothing that it
 /// knows can spell: two things stand for it, and a number that differs is NaN.
-fn parse_respelled(parse: impl Fn(&str) -> Option<Element>, line: &[u8]) -> Option<Element> {
+fn parse_respelled<const CARRIES: bool>(
+    parse: impl Fn(&str) -> Option<Element<CARRIES>>,
+    line: &[u8],
+) -> Option<Element<CARRIES>> {
     let (above, below) = (respell(line, "1e999")?, respell(line, "-1e999")?);
     let mut element = parse(&above)?;
     if above != below {
@@ -376,6 +486,14 @@ fn parse_respelled(parse: impl Fn(&str) -> Option<Element>, line: &[u8]) -> Opti
             mark(x, y);
         }
         mark(&mut element.weight, other.weight);
+        for (numbers, others) in [
+            (&mut element.numbers, other.numbers),
+            (&mut element.texture_coordinates, other.texture_coordinates),
+        ] {
+            for (x, y) in numbers.iter_mut().zip(others) {
+                mark(x, y);
+            }
+        }
     }
     Some(element)
 }
@@ -413,9 +531,14 @@ mod tests {
     use super::*;
     use crate::indexed_mesh::IndexedMesh;
 
+    /// Without attributes.
     fn read(input: Input, vertex_weight: Option<&str>) -> Result<IndexedMesh> {
         let mut builder = MeshBuilder::default();
-        super::read(input, vertex_weight, &mut builder)?;
+        let wanted = Wanted {
+            vertex_weight,
+            attributes: false,
+        };
+        super::read(input, wanted, &mut builder)?;
         builder.finish()
     }
 

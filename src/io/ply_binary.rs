@@ -1,13 +1,17 @@
 //! The elements of a binary PLY file whose layout is plain, decoded from blocks: vertices of
 //! numbers, faces of one list with numbers beside it, and whatever has one size and no meaning here.
 
+use std::ops::Range;
+
 use ply_rs_bw::ply::{ElementDef, PropertyType, ScalarType};
 
+use crate::attributes::Values;
 use crate::error::{Error, Place, Result};
 
 use super::blocks::Blocks;
 use super::ply::{Fault, Sink};
-use super::ply_header::{AXES, CORNERS, Role, WEIGHT};
+use super::ply_attributes::Carried;
+use super::ply_header::{AXES, CORNERS, Role, TEXTURE_COORDINATES, WEIGHT};
 
 /// How the elements of one definition lie in the file.
 pub(super) enum Plain {
@@ -24,17 +28,37 @@ pub(super) struct Vertices {
     weight: Option<Number>,
     /// Whether the coordinates are 32-bit floats.
     single: bool,
+    /// The components of each channel.
+    channels: Vec<Vec<Number>>,
 }
 
-/// Faces of one list with numbers before and behind it.
+/// Faces of one list with numbers before and behind it, or of two.
 pub(super) struct Faces {
     bytes_before: usize,
-    count: ScalarType,
-    corner: ScalarType,
+    corners: List,
     bytes_behind: usize,
+    /// Texture coordinates, and the bytes behind them.
+    more: Option<(List, usize)>,
+    /// What tells groups apart.
+    groups: Vec<(Stretch, Number)>,
 }
 
-/// A number in an element: its type, and its distance from the element's first byte.
+/// A list of numbers.
+struct List {
+    count: ScalarType,
+    item: ScalarType,
+}
+
+/// Where in a face a number has its place: before the corners, behind them, behind texture coordinates.
+#[derive(Clone, Copy)]
+enum Stretch {
+    Before,
+    Behind,
+    Last,
+}
+
+/// A number in an element: its type, and its distance from the element's first byte, or from where its
+/// stretch begins.
 struct Number {
     scalar: ScalarType,
     at: usize,
@@ -42,12 +66,13 @@ struct Number {
 
 impl Plain {
     /// The layout of the elements that `def` defines, where it is plain.
-    pub fn of(def: &ElementDef, vertex_weight: Option<&str>) -> Option<Plain> {
+    pub fn of(def: &ElementDef, vertex_weight: Option<&str>, carried: &Carried) -> Option<Plain> {
         let role = Role::of(def);
         if role == Role::Face {
-            return Plain::faces(def);
+            return Plain::faces(def, carried);
         }
-        let bytes = size_of_numbers(def.properties.values().map(|p| &p.data_type))?;
+        let types: Vec<_> = def.properties.values().map(|p| &p.data_type).collect();
+        let bytes = size_of_numbers(&types)?;
         match role {
             Role::Vertex { single } => {
                 let [x, y, z] = AXES.map(|axis| Number::of(def, axis));
@@ -56,11 +81,17 @@ impl Plain {
                     Some(_) => Some(Number::of(def, WEIGHT)?),
                     None => None,
                 };
+                let channel = |numbers: &Vec<usize>| {
+                    let number = |&i: &usize| Number::at(def, 0, i);
+                    numbers.iter().map(number).collect()
+                };
+                let channels: Option<_> = carried.channels.iter().map(channel).collect();
                 Some(Plain::Vertices(Vertices {
                     bytes,
                     axes: [x?, y?, z?],
                     weight,
                     single,
+                    channels: channels?,
                 }))
             }
             Role::Face | Role::Strips => None,
@@ -68,33 +99,84 @@ impl Plain {
         }
     }
 
-    fn faces(def: &ElementDef) -> Option<Plain> {
-        let (list, _, property) = def.properties.get_full(CORNERS)?;
-        let PropertyType::List(count, corner) = &property.data_type else {
-            return None;
+    fn faces(def: &ElementDef, carried: &Carried) -> Option<Plain> {
+        let corners = def.properties.get_index_of(CORNERS)?;
+        let more = if carried.has_texture_coordinates {
+            let more = def.properties.get_index_of(TEXTURE_COORDINATES)?;
+            Some(more).filter(|&more| more > corners)
+        } else {
+            None
         };
-        let mut types = def.properties.values().map(|p| &p.data_type);
-        let bytes_before = size_of_numbers(types.by_ref().take(list))?;
+        let types: Vec<_> = def.properties.values().map(|p| &p.data_type).collect();
+        let end = more.unwrap_or(types.len());
+        let last = match more {
+            Some(more) => Some((List::of(types[more])?, size_of_numbers(&types[more + 1..])?)),
+            None => None,
+        };
+        let group = |&i: &usize| {
+            let (stretch, first) = match more {
+                _ if i < corners => (Stretch::Before, 0),
+                Some(more) if i > more => (Stretch::Last, more + 1),
+                _ => (Stretch::Behind, corners + 1),
+            };
+            Some((stretch, Number::at(def, first, i)?))
+        };
+        let groups: Option<_> = carried.groups.iter().map(group).collect();
         Some(Plain::Faces(Faces {
-            bytes_before,
-            count: count.clone(),
-            corner: corner.clone(),
-            bytes_behind: size_of_numbers(types.skip(1))?,
+            bytes_before: size_of_numbers(&types[..corners])?,
+            corners: List::of(types[corners])?,
+            bytes_behind: size_of_numbers(&types[corners + 1..end])?,
+            more: last,
+            groups: groups?,
         }))
+    }
+}
+
+impl List {
+    fn of(data_type: &PropertyType) -> Option<List> {
+        match data_type {
+            PropertyType::List(count, item) => Some(List {
+                count: count.clone(),
+                item: item.clone(),
+            }),
+            PropertyType::Scalar(_) => None,
+        }
+    }
+
+    /// Where the list that begins at `at` begins and ends behind its length.
+    fn range<const BIG: bool>(
+        &self,
+        block: &[u8],
+        at: usize,
+    ) -> std::result::Result<Range<usize>, Stop> {
+        let begin = at + size_of_scalar(&self.count);
+        if block.len() < begin {
+            return Err(Stop::Wanted(begin));
+        }
+        let count = integer::<BIG>(&self.count, &block[at..]);
+        let count = usize::try_from(count).map_err(|_| Stop::Fault(Fault::NegativeLength))?;
+        let end = count
+            .saturating_mul(size_of_scalar(&self.item))
+            .saturating_add(begin);
+        Ok(begin..end)
     }
 }
 
 impl Number {
     /// The property of that name, where it and all before it are numbers.
     fn of(def: &ElementDef, name: &str) -> Option<Number> {
-        let (i, _, property) = def.properties.get_full(name)?;
-        let PropertyType::Scalar(scalar) = &property.data_type else {
+        Number::at(def, 0, def.properties.get_index_of(name)?)
+    }
+
+    /// Property `i` in the stretch that begins with property `first`, where all in between are numbers.
+    fn at(def: &ElementDef, first: usize, i: usize) -> Option<Number> {
+        let PropertyType::Scalar(scalar) = &def.properties[i].data_type else {
             return None;
         };
-        let before = def.properties.values().take(i).map(|p| &p.data_type);
+        let types: Vec<_> = def.properties.values().map(|p| &p.data_type).collect();
         Some(Number {
             scalar: scalar.clone(),
-            at: size_of_numbers(before)?,
+            at: size_of_numbers(&types[first..i])?,
         })
     }
 
@@ -151,6 +233,9 @@ impl Decoder<'_, '_> {
         if let Some(left) = self.bytes_left() {
             let promised = self.def.count.min(left / layout.bytes);
             self.sink.builder.reserve_vertices(promised);
+            for channel in &mut self.sink.builder.attributes().channels {
+                channel.values.reserve(promised * channel.width());
+            }
         }
         let [x, y, z] = layout.axes.each_ref().map(|axis| axis.at);
         let single = |bytes: &[u8]| f32::from_le_bytes(low_first::<BIG, 4>(bytes));
@@ -162,6 +247,10 @@ impl Decoder<'_, '_> {
                     sink.push_weight(weight.read::<BIG>(element))
                         .map_err(fault)?;
                 }
+            }
+            let channels = &mut sink.builder.attributes().channels;
+            for (channel, numbers) in channels.iter_mut().zip(&layout.channels) {
+                push_numbers::<BIG>(&mut channel.values, numbers, elements.clone());
             }
             if layout.single && [y, z] == [x + 4, x + 8] {
                 sink.builder.push_singles(elements.map(|element| {
@@ -182,12 +271,14 @@ impl Decoder<'_, '_> {
     }
 
     fn faces<const BIG: bool>(&mut self, layout: &Faces) -> Result<()> {
-        if let Some(left) = self.bytes_left() {
+        if let Some(left) = self.bytes_left()
+            && layout.more.is_none()
+        {
             let triangles = layout.triangles_in(self.def.count, left);
             self.sink.builder.reserve_triangles(triangles);
         }
         let Decoder { def, blocks, sink } = self;
-        let mut corners = Vec::new();
+        let mut face = Face::default();
         let (mut i, mut wanted) = (0, 1);
         while i < def.count {
             let block = blocks.peek(wanted)?;
@@ -202,7 +293,7 @@ impl Decoder<'_, '_> {
                 if i == def.count {
                     break Stop::Wanted(0);
                 }
-                match layout.polygon::<BIG>(&block[at..], sink, &mut corners) {
+                match layout.polygon::<BIG>(&block[at..], sink, &mut face) {
                     Ok(bytes) => at += bytes,
                     Err(stop) => break stop,
                 }
@@ -242,20 +333,23 @@ impl Faces {
     /// The triangles of `count` faces in so many bytes, if these hold nothing else and no face has
     /// fewer than two corners.
     fn triangles_in(&self, count: usize, bytes: usize) -> usize {
-        let beside = self.bytes_before + size_of_scalar(&self.count) + self.bytes_behind;
+        let beside = self.bytes_before + size_of_scalar(&self.corners.count) + self.bytes_behind;
         let lists = bytes.saturating_sub(count.saturating_mul(beside));
-        (lists / size_of_scalar(&self.corner)).saturating_sub(count.saturating_mul(2))
+        (lists / size_of_scalar(&self.corners.item)).saturating_sub(count.saturating_mul(2))
     }
 
     fn bytes_of_triangle(&self) -> usize {
-        let list = size_of_scalar(&self.count) + 3 * size_of_scalar(&self.corner);
+        let list = size_of_scalar(&self.corners.count) + 3 * size_of_scalar(&self.corners.item);
         self.bytes_before + list + self.bytes_behind
     }
 
-    /// Takes the triangles without fault that `block` begins with, if they have the usual types, but
-    /// no more than `most`; returns how many.
+    /// Takes the triangles without fault that `block` begins with, if they have the usual types and
+    /// nothing else that matters, but no more than `most`; returns how many.
     fn triangles<const BIG: bool>(&self, block: &[u8], most: usize, sink: &mut Sink) -> usize {
-        let vertices = match (&self.count, &self.corner) {
+        if self.more.is_some() || !self.groups.is_empty() {
+            return 0;
+        }
+        let vertices = match (&self.corners.count, &self.corners.item) {
             // What is negative is 2^31 or more here.
             (ScalarType::UChar, ScalarType::Int) => sink.vertices.min(1 << 31) as u32,
             (ScalarType::UChar, ScalarType::UInt) => sink.vertices.min(u32::MAX as usize) as u32,
@@ -279,33 +373,100 @@ impl Faces {
         &self,
         block: &[u8],
         sink: &mut Sink,
-        corners: &mut Vec<u32>,
+        face: &mut Face,
     ) -> std::result::Result<usize, Stop> {
-        let list = self.bytes_before + size_of_scalar(&self.count);
-        if block.len() < list {
-            return Err(Stop::Wanted(list));
+        let corners = self.corners.range::<BIG>(block, self.bytes_before)?;
+        let behind = corners.end;
+        let mut end = behind.saturating_add(self.bytes_behind);
+        if block.len() < end {
+            return Err(Stop::Wanted(end));
         }
-        let count = integer::<BIG>(&self.count, &block[self.bytes_before..]);
-        let count = usize::try_from(count).map_err(|_| Stop::Fault(Fault::NegativeLength))?;
-        let corner_bytes = size_of_scalar(&self.corner);
-        let behind = count.saturating_mul(corner_bytes).saturating_add(list);
-        let bytes = behind.saturating_add(self.bytes_behind);
-        if block.len() < bytes {
-            return Err(Stop::Wanted(bytes));
+        let mut last = end;
+        face.texture_coordinates.clear();
+        if let Some((list, bytes_behind)) = &self.more {
+            let range = list.range::<BIG>(block, end)?;
+            last = range.end;
+            end = last.saturating_add(*bytes_behind);
+            if block.len() < end {
+                return Err(Stop::Wanted(end));
+            }
+            let items = block[range].chunks_exact(size_of_scalar(&list.item));
+            let numbers = items.map(|item| number::<BIG>(&list.item, item));
+            face.texture_coordinates.extend(numbers);
         }
-        corners.clear();
-        for corner in block[list..behind].chunks_exact(corner_bytes) {
-            let v = integer::<BIG>(&self.corner, corner);
-            corners.push(sink.corner(v).map_err(Stop::Fault)?);
+        face.corners.clear();
+        for corner in block[corners].chunks_exact(size_of_scalar(&self.corners.item)) {
+            let v = integer::<BIG>(&self.corners.item, corner);
+            face.corners.push(sink.corner(v).map_err(Stop::Fault)?);
         }
-        sink.builder.push_polygon(corners);
-        Ok(bytes)
+        face.values.clear();
+        face.values
+            .extend(self.groups.iter().map(|(stretch, number)| {
+                let begin = match stretch {
+                    Stretch::Before => 0,
+                    Stretch::Behind => behind,
+                    Stretch::Last => last,
+                };
+                number.read::<BIG>(&block[begin..])
+            }));
+        sink.push_face(&face.corners, &face.values, &face.texture_coordinates);
+        Ok(end)
+    }
+}
+
+/// What a face has.
+#[derive(Default)]
+struct Face {
+    corners: Vec<u32>,
+    /// What tells groups apart.
+    values: Vec<f64>,
+    texture_coordinates: Vec<f64>,
+}
+
+/// Adds the numbers of each element, one type of them at a time where they have one.
+fn push_numbers<'a, const BIG: bool>(
+    values: &mut Values,
+    numbers: &[Number],
+    elements: impl Iterator<Item = &'a [u8]>,
+) {
+    let is_all = |scalar: ScalarType| numbers.iter().all(|number| number.scalar == scalar);
+    match values {
+        Values::Singles(list) if is_all(ScalarType::Float) => {
+            let single = |bytes: &[u8]| f32::from_le_bytes(low_first::<BIG, 4>(bytes));
+            extend(list, numbers, elements, single);
+        }
+        Values::Singles(list) if is_all(ScalarType::UChar) => {
+            extend(list, numbers, elements, |bytes: &[u8]| bytes[0].into());
+        }
+        values => {
+            for element in elements {
+                let all = numbers.iter().map(|number| number.read::<BIG>(element));
+                all.for_each(|x| values.push(x));
+            }
+        }
+    }
+}
+
+/// Adds what `read` finds at each number of each element; the usual three are taken at once.
+fn extend<'a>(
+    list: &mut Vec<f32>,
+    numbers: &[Number],
+    elements: impl Iterator<Item = &'a [u8]>,
+    read: impl Fn(&[u8]) -> f32,
+) {
+    if let [x, y, z] = numbers {
+        let [x, y, z] = [x.at, y.at, z.at];
+        list.extend(elements.flat_map(|element| [x, y, z].map(|at| read(&element[at..]))));
+    } else {
+        for element in elements {
+            list.extend(numbers.iter().map(|number| read(&element[number.at..])));
+        }
     }
 }
 
 /// The bytes of properties that are all numbers.
-fn size_of_numbers<'a>(mut types: impl Iterator<Item = &'a PropertyType>) -> Option<usize> {
-    types.try_fold(0, |sum, data_type| match data_type {
+fn size_of_numbers(types: &[&PropertyType]) -> Option<usize> {
+    types.iter().try_fold(0, |sum, data_type| match data_type {
         PropertyType::Scalar(scalar) => Some(sum + size_of_scalar(scalar)),
         PropertyType::List(..) => None,
     })
@@ -354,18 +515,22 @@ fn integer<const BIG: bool>(scalar: &ScalarType, bytes: &[u8]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::super::input::Input;
-    use super::super::ply;
+    use super::super::ply::{self, Wanted};
     use super::*;
     use crate::indexed_mesh::{IndexedMesh, MeshBuilder};
 
     /// The mesh in a file in which `plain` finds the plain layouts.
     fn read_with(
         input: Input,
-        weight: Option<&str>,
-        plain: impl Fn(&ElementDef, Option<&str>) -> Option<Plain>,
+        vertex_weight: Option<&str>,
+        plain: impl Fn(&ElementDef, Option<&str>, &Carried) -> Option<Plain>,
     ) -> Result<IndexedMesh> {
         let mut builder = MeshBuilder::default();
-        ply::read_with(input, weight, plain, &mut builder)?;
+        let wanted = Wanted {
+            vertex_weight,
+            attributes: true,
+        };
+        ply::read_with(input, wanted, plain, &mut builder)?;
         builder.finish()
     }
 
@@ -417,12 +582,21 @@ mod tests {
             TYPES[self.random.below(8)]
         }
 
-        /// Names with types that nothing asks for.
+        /// Names with types beside those that make the mesh.
         fn company(&mut self, most: usize) -> Vec<(String, String)> {
-            let names = ["red", "nx", "quality", "flags", "s", "confidence"];
+            let names = [
+                "red", "green", "blue", "alpha", "nx", "ny", "nz", "s", "t", "quality", "flags",
+                "label",
+            ];
             let n = self.random.below(most + 1);
-            (0..n)
-                .map(|i| (names[i].to_string(), self.any_type().to_string()))
+            let first = self.random.below(names.len());
+            let same = self.random.one_in(2).then(|| self.any_type());
+            let names = names.iter().cycle().skip(first).take(n);
+            names
+                .map(|name| {
+                    let data_type = same.unwrap_or_else(|| self.any_type());
+                    (name.to_string(), data_type.to_string())
+                })
                 .collect()
         }
 
@@ -457,7 +631,7 @@ mod tests {
 
         fn vertices(&mut self, count: usize) {
             let same = self.random.one_in(2).then_some("float");
-            let mut properties = self.company(4);
+            let mut properties = self.company(8);
             if self.random.one_in(3) {
                 properties.clear();
             }
@@ -502,18 +676,22 @@ mod tests {
             } else {
                 (TYPES[self.random.below(6)], TYPES[self.random.below(6)])
             };
-            let mut properties = self.company(3);
+            let mut properties = self.company(4);
             let at = self.random.below(properties.len() + 1);
             let name = ["vertex_indices", "vertex_index"][self.random.below(2)];
             properties.insert(at, (name.to_string(), format!("list {length} {corner}")));
-            if self.random.one_in(6) {
+            if self.random.one_in(3) {
                 let at = self.random.below(properties.len() + 1);
                 properties.insert(at, ("texcoord".to_string(), "list uchar float".to_string()));
             }
             let all_triangles = self.random.one_in(2);
             self.element("face", count, &properties, |random, property, _| {
+                if property == "texcoord" {
+                    let numbers = [6, 6, 6, 6, 6, 6, 8, 0, 5][random.below(9)];
+                    return (0..numbers).map(|_| random.below(4) as f64 / 3.0).collect();
+                }
                 if !property.starts_with("vertex") {
-                    return vec![random.below(100) as f64; 1 + random.below(2)];
+                    return vec![(random.below(100) / 60) as f64];
                 }
                 let corners = if all_triangles || random.below(3) > 0 {
                     3
@@ -587,7 +765,7 @@ mod tests {
     fn same(bytes: &[u8], weight: Option<&str>, case: &str) -> String {
         let from_file = || Input::from_bytes("a.ply", bytes).unwrap();
         let from_stream = || Input::from_stream("a.ply", bytes).unwrap();
-        let expected = shown(read_with(from_file(), weight, |_, _| None));
+        let expected = shown(read_with(from_file(), weight, |_, _, _| None));
         assert_eq!(
             shown(read_with(from_file(), weight, Plain::of)),
             expected,
@@ -698,9 +876,13 @@ mod tests {
         }
         let layout = Faces {
             bytes_before: 0,
-            count: ScalarType::UChar,
-            corner: ScalarType::Int,
+            corners: List {
+                count: ScalarType::UChar,
+                item: ScalarType::Int,
+            },
             bytes_behind: 0,
+            more: None,
+            groups: Vec::new(),
         };
         assert_eq!(layout.triangles_in(1000, 13_000), 1000);
         assert_eq!(layout.triangles_in(500, 17 * 500), 1000);

@@ -1,7 +1,7 @@
 //! The header of a PLY file, tidied line by line before ply-rs-bw parses it: its grammar takes one
 //! blank between words and two properties of one name for one, and a name in Latin-1 stops it.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::{BufRead, Read};
 
 use ply_rs_bw::parser::{Parser, Reader};
@@ -17,20 +17,74 @@ pub(super) const CORNERS: &str = "vertex_indices";
 /// What the vertex weight is called here, whichever name it has in the file; but a coordinate that
 /// is the weight too keeps its name.
 pub(super) const WEIGHT: &str = "vertex_weight";
+/// What the list of a face's texture coordinates is called, here and in files; nothing else is so here.
+pub(super) const TEXTURE_COORDINATES: &str = "texcoord";
 /// The coordinates.
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Longer than any header that anyone wrote.
-const MAX_HEADER_BYTES: usize = 1 << 20;
+pub(super) const MAX_HEADER_BYTES: usize = 1 << 24;
 
 /// A parsed header.
 pub(super) struct Header {
     pub encoding: Encoding,
     /// In the file's order.
     pub elements: Vec<ElementDef>,
+    /// What the file calls the properties of each element.
+    pub names: Vec<Vec<String>>,
+    pub comments: Comments,
     /// How many lines it has.
     pub lines: usize,
     /// How many bytes it has.
     pub bytes: u64,
+}
+
+/// What comments say.
+#[derive(Default)]
+pub(super) struct Comments {
+    /// `TextureFile`, as MeshLab writes it.
+    pub textures: Vec<String>,
+    /// `mtllib`.
+    pub material_libraries: Vec<String>,
+    /// What the numbers of each of [`NAMED`] stand for.
+    pub names: [HashMap<i64, String>; 3],
+}
+
+/// The face properties whose numbers stand for names of objects, groups and materials where comments
+/// say so: `comment object 0 chair`.
+pub(super) const NAMED: [(&str, &str); 3] = [
+    ("object", "object"),
+    ("group", "group"),
+    ("material_index", "material"),
+];
+/// The comment that names a picture.
+pub(super) const TEXTURE_FILE: &str = "TextureFile";
+/// The comment that names a material library.
+pub(super) const MATERIAL_LIBRARY: &str = "mtllib";
+
+impl Comments {
+    /// Takes what stands behind the word `comment`.
+    fn push(&mut self, comment: &str) {
+        let split = |text: &str| {
+            let (word, rest) = text.trim().split_once(|c: char| c.is_ascii_whitespace())?;
+            Some((word.to_string(), rest.trim().to_string()))
+        };
+        let Some((keyword, rest)) = split(comment) else {
+            return;
+        };
+        match keyword.as_str() {
+            TEXTURE_FILE => self.textures.push(rest),
+            MATERIAL_LIBRARY => self.material_libraries.push(rest),
+            _ => {
+                let named = NAMED.iter().position(|&(_, word)| word == keyword);
+                if let Some(i) = named
+                    && let Some((number, name)) = split(&rest)
+                    && let Ok(number) = number.parse()
+                {
+                    self.names[i].insert(number, name);
+                }
+            }
+        }
+    }
 }
 
 impl Header {
@@ -97,12 +151,14 @@ pub(super) fn read(input: &mut Input, vertex_weight: Option<&str>) -> Result<Hea
     let header = Header {
         encoding: parsed.encoding,
         elements: parsed.elements.into_values().collect(),
+        names: tidy.names,
+        comments: tidy.comments,
         lines: tidy.lines,
         bytes: tidy.bytes,
     };
     check(&header, input)?;
     if let Some(property) = vertex_weight {
-        check_weight(&header, property, &tidy.vertex_properties, input)?;
+        check_weight(&header, property, input)?;
     }
     Ok(header)
 }
@@ -145,12 +201,12 @@ fn check(header: &Header, input: &Input) -> Result<()> {
 }
 
 /// The vertices have a number for their weight.
-fn check_weight(header: &Header, property: &str, there: &[String], input: &Input) -> Result<()> {
+fn check_weight(header: &Header, property: &str, input: &Input) -> Result<()> {
     let fail = |found: String, expected: &str| Err(input.error(Place::File, &found, expected));
     let is_axis = AXES.contains(&property);
     let name = if is_axis { property } else { WEIGHT };
-    let mut vertices = header.elements.iter().filter(|def| def.name == "vertex");
-    let found = vertices.find_map(|def| def.properties.get(name));
+    let vertices = header.elements.iter().position(|def| def.name == "vertex");
+    let found = vertices.and_then(|i| header.elements[i].properties.get(name));
     match found.map(|p| &p.data_type) {
         Some(PropertyType::Scalar(_)) => Ok(()),
         Some(PropertyType::List(..)) => {
@@ -159,6 +215,7 @@ fn check_weight(header: &Header, property: &str, there: &[String], input: &Input
         }
         None => {
             let found = format!("vertex has no property '{property}'");
+            let there = vertices.map_or(&[][..], |i| &header.names[i]);
             let expected = match there {
                 [] => "vertices with properties".to_string(),
                 there => format!("one of {}", there.join(", ")),
@@ -173,8 +230,9 @@ fn check_weight(header: &Header, property: &str, there: &[String], input: &Input
 struct Tidy<'a> {
     /// The vertex property to call [`WEIGHT`].
     vertex_weight: Option<&'a str>,
-    /// As the file names them.
-    vertex_properties: Vec<String>,
+    /// What the file calls the properties of each element.
+    names: Vec<Vec<String>>,
+    comments: Comments,
     in_vertex: bool,
     text: String,
     lines: usize,
@@ -239,6 +297,9 @@ impl<'a> Tidy<'a> {
     /// Appends a line with single blanks, without the text of comments, and with names that differ.
     fn push(&mut self, line: &[u8]) {
         let line = String::from_utf8_lossy(line);
+        if let Some(comment) = line.trim_start().strip_prefix("comment") {
+            self.comments.push(comment);
+        }
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         match words.as_slice() {
             [] | ["comment" | "obj_info", ..] => self.text.push_str("comment"),
@@ -246,13 +307,14 @@ impl<'a> Tidy<'a> {
                 let name = self.unique(name, true);
                 self.in_vertex = name == "vertex";
                 self.properties.clear();
+                self.names.push(Vec::new());
                 self.text.push_str(&format!("element {name} {count}"));
             }
             ["property", types @ .., name] => {
                 let list = types.first() == Some(&"list");
                 let is_weight = self.in_vertex && self.vertex_weight == Some(name);
-                if self.in_vertex {
-                    self.vertex_properties.push(name.to_string());
+                if let Some(names) = self.names.last_mut() {
+                    names.push(name.to_string());
                 }
                 let name = match *name {
                     "x" | "y" | "z" if list => "list",
@@ -260,6 +322,7 @@ impl<'a> Tidy<'a> {
                     "vertex_index" if list => CORNERS,
                     CORNERS if !list => "scalar",
                     WEIGHT => "other",
+                    TEXTURE_COORDINATES if !list => "scalar",
                     name => name,
                 };
                 let name = self.unique(name, false);

@@ -207,12 +207,17 @@ pub(super) fn words_before_comment(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// What a message says, on one line whatever names of the file stand in it, and no longer than
 /// anyone reads.
 pub(super) fn one_line(text: &str) -> String {
-    let clean = |c: char| if c.is_control() { ' ' } else { c };
-    let mut line: String = text.chars().map(clean).take(MESSAGE_CHARS).collect();
+    let mut line: String = without_control(text).take(MESSAGE_CHARS).collect();
     if text.chars().nth(MESSAGE_CHARS).is_some() {
         line.push('…');
     }
     line
+}
+
+/// A text with blanks for what would end a line or move a cursor.
+pub(super) fn without_control(text: &str) -> impl Iterator<Item = char> + '_ {
+    let clean = |c: char| if c.is_control() { ' ' } else { c };
+    text.chars().map(clean)
 }
 
 /// A piece of a file as a message repeats it: in quotes, shortened.

@@ -1,0 +1,73 @@
+//! What a format has no place for.
+
+use crate::attributes::{Channel, Group, Kind};
+use crate::indexed_mesh::IndexedMesh;
+
+use super::Format;
+use super::obj_output::ObjChannels;
+use super::ply_output::Columns;
+use super::text::one_line;
+
+/// What a file of `format` will not have of a mesh, in short sentences.
+pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
+    let attributes = mesh.attributes();
+    let mut lost = Vec::new();
+    match format {
+        Format::Ply => {
+            let columns = Columns::of(attributes);
+            if !columns.have_names() {
+                lost.push("names of groups that take more than a header may".to_string());
+            }
+            let properties = attributes.face_properties.iter().enumerate();
+            let properties = properties.filter(|&(i, _)| !columns.has_value(i));
+            lost.extend(properties.map(|(_, p)| format!("two face properties '{}'", p.name)));
+        }
+        Format::Obj => {
+            let channels = ObjChannels::of(attributes);
+            let others = attributes.channels.iter().filter(|c| !channels.contains(c));
+            lost.extend(others.map(described));
+            if let Some(alpha) = channels.colors.and_then(|c| c.components.get(3)) {
+                lost.push(format!("vertex property '{}'", alpha.name));
+            }
+            lost.extend(face_properties(mesh));
+            lost.extend(some(&attributes.textures, "texture files"));
+        }
+        Format::Stl | Format::Off => {
+            lost.extend(attributes.channels.iter().map(described));
+            lost.extend(face_properties(mesh));
+            let names: [(fn(&Group) -> &String, &str); 3] = [
+                (|g| &g.object, "objects"),
+                (|g| &g.name, "groups"),
+                (|g| &g.material, "materials"),
+            ];
+            for (name, what) in names {
+                let has_name = attributes.groups.iter().any(|g| !name(g).is_empty());
+                lost.extend(has_name.then(|| what.to_string()));
+            }
+            lost.extend(some(&attributes.material_libraries, "material libraries"));
+            lost.extend(some(&attributes.textures, "texture files"));
+        }
+    }
+    let sentence = |what: &String| one_line(&format!("{format} has no place for {what}"));
+    lost.iter().map(sentence).collect()
+}
+
+fn described(channel: &Channel) -> String {
+    let names: Vec<&str> = channel.components.iter().map(|p| p.name.as_str()).collect();
+    let what = match channel.kind {
+        Kind::Normal => "normals",
+        Kind::TextureCoordinate => "texture coordinates",
+        Kind::Color => "colours",
+        Kind::Scalar => return format!("vertex property '{}'", names.join(" ")),
+    };
+    format!("{what} ({})", names.join(", "))
+}
+
+fn face_properties(mesh: &IndexedMesh) -> impl Iterator<Item = String> + '_ {
+    let properties = mesh.attributes().face_properties.iter();
+    properties.map(|p| format!("face property '{}'", p.name))
+}
+
+fn some(list: &[String], what: &str) -> Option<String> {
+    (!list.is_empty()).then(|| what.to_string())
+}
