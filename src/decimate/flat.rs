@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::curves::Curves;
 use super::geometry::Geometry;
 use super::surface::Surface;
 use crate::indexed_mesh::Parts;
@@ -162,7 +163,7 @@ impl<V> Flat<V> {
         let surface = Surface {
             locked: self.locked,
             double_sided,
-            creases,
+            curves: Curves::of(&mesh, creases),
             weights: self.weights,
             deviation,
             lost: 0.0,
@@ -178,7 +179,7 @@ impl<V> Flat<V> {
 impl<S: EdgeStore> Surface<S> {
     /// What is known of a face.
     pub fn flags(&self, f: FaceId) -> FaceFlags {
-        FaceFlags::of(f, &self.double_sided, &self.turned, &self.creases)
+        FaceFlags::of(f, &self.double_sided, &self.turned, self.curves.creases())
     }
 
     /// The arrays of what is left.
@@ -188,7 +189,7 @@ impl<S: EdgeStore> Surface<S> {
         } else {
             Vec::new()
         };
-        let creased = !self.creases.is_empty();
+        let creased = self.curves.are_kept();
         let Self {
             mut mesh,
             geometry,

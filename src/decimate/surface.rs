@@ -1,8 +1,8 @@
 //! A mesh being decimated: connectivity, geometry and what is carried along.
 
 use glam::{DVec3, Vec3};
-use smallvec::SmallVec;
 
+use super::curves::Curves;
 use super::geometry::Geometry;
 use super::options::{Boundary, Options};
 use super::rules;
@@ -16,6 +16,9 @@ pub struct Merged {
     pub from: [Vec3; 2],
     /// The vertices around that may have lost faces, too, where it was no mere collapse.
     pub around: Vec<VertexId>,
+    /// Where the vertex that is left is busy and stayed where it was: those of its edges that were
+    /// the other's, and those that became one with one of them. All else around it is as it was.
+    pub gained: Option<Vec<EdgeId>>,
 }
 
 /// How an edge is collapsed.
@@ -47,8 +50,8 @@ pub struct Surface<S> {
     pub double_sided: Vec<bool>,
     /// One flag a face that was turned round to agree with its neighbours, or nothing where none was.
     pub turned: Vec<bool>,
-    /// One flag a directed edge that is kept as part of a curve, or nothing where none is.
-    pub creases: Vec<bool>,
+    /// The curves that are kept.
+    pub curves: Curves,
     /// What the cost is multiplied by around each vertex, or nothing where by 1.
     pub weights: Vec<f32>,
     /// An estimate of how far each vertex is from the original, in the unit box.
@@ -81,7 +84,7 @@ impl<S: EdgeStore> Surface<S> {
 
     /// Whether anything is to be said of faces beside their vertices.
     pub fn has_flags(&self) -> bool {
-        !(self.double_sided.is_empty() && self.turned.is_empty() && self.creases.is_empty())
+        !(self.double_sided.is_empty() && self.turned.is_empty()) || self.curves.are_kept()
     }
 
     /// Locks a vertex.
@@ -136,12 +139,7 @@ impl<S: EdgeStore> Surface<S> {
     /// Whether the edge is kept as part of a curve that is neither boundary nor non-manifold.
     #[inline]
     pub fn is_crease(&self, e: EdgeId) -> bool {
-        self.creases.get(e.index()) == Some(&true)
-    }
-
-    /// Whether the edge is a crease, a boundary or non-manifold.
-    fn is_curve(&self, e: EdgeId) -> bool {
-        self.is_crease(e) || self.mesh.mate(e).is_none()
+        self.curves.is_crease(e)
     }
 
     /// Marks the edges at which the surface turns by more than `degrees` as creases.
@@ -159,14 +157,7 @@ impl<S: EdgeStore> Surface<S> {
         for e in mesh.faces().flat_map(FaceId::edges) {
             creases[e.index()] = is_sharp(e);
         }
-        self.creases = creases;
-    }
-
-    /// How many edges at `v` are creases, boundaries or non-manifold: 0 on a smooth piece, 2 on a
-    /// curve, anything else where curves end or meet.
-    pub fn curves_at(&self, v: VertexId) -> usize {
-        let edges = self.mesh.vertex_edges(v);
-        edges.into_iter().filter(|&e| self.is_curve(e)).count()
+        self.curves = Curves::of(&self.mesh, creases);
     }
 
     /// Which ends of `e` stay where they are if it collapses, tail first.
@@ -176,56 +167,45 @@ impl<S: EdgeStore> Surface<S> {
         if !self.seam.is_empty() && (self.is_on_seam(ends[0]) | self.is_on_seam(ends[1])) {
             return [true; 2];
         }
-        if self.locked.is_empty() && self.creases.is_empty() {
+        if self.locked.is_empty() && !self.curves.are_kept() {
             return [false; 2];
         }
-        self.held_by_lock_or_crease(e)
+        self.held_by_lock_or_curve(e)
     }
 
-    fn held_by_lock_or_crease(&self, e: EdgeId) -> [bool; 2] {
-        let ends = self.mesh.edge_vertices(e);
-        let mut held = ends.map(|v| self.is_locked(v));
-        if !self.creases.is_empty() {
-            let free = if self.is_curve(e) { 2 } else { 0 };
-            for (held, v) in held.iter_mut().zip(ends) {
-                *held |= self.curves_at(v) != free;
-            }
+    fn held_by_lock_or_curve(&self, e: EdgeId) -> [bool; 2] {
+        let mut held = self.curves.held(&self.mesh, e);
+        for (held, v) in held.iter_mut().zip(self.mesh.edge_vertices(e)) {
+            *held |= self.is_locked(v);
         }
         held
-    }
-
-    /// Whether collapsing `e` keeps the creases: no two of them become one. (That no curve is
-    /// pinched or pulled off its ends follows from what is [held](Self::held).)
-    pub fn crease_condition(&self, e: EdgeId) -> bool {
-        if self.creases.is_empty() {
-            return true;
-        }
-        let mut star = self.mesh.edge_star(e).into_iter();
-        !star.any(|d| self.is_curve(self.mesh.next(d)) && self.is_curve(self.mesh.prev(d)))
     }
 
     /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried.
     /// `deviation` is what [`deviation_after`](Self::deviation_after) said.
     pub fn collapse(&mut self, e: EdgeId, position: Vec3, way: &Way, deviation: f32) -> Merged {
-        let from = self
-            .mesh
-            .edge_vertices(e)
-            .map(|v| self.geometry.position(v));
-        let beside = |d: EdgeId| [self.mesh.next(d), self.mesh.prev(d)];
-        let has_crease = |d: &EdgeId| beside(*d).into_iter().any(|e| self.is_crease(e));
-        let creased: SmallVec<[FaceId; 2]> = if self.creases.is_empty() {
-            SmallVec::new()
-        } else {
-            let star = self.mesh.edge_star(e).into_iter();
-            star.filter(has_crease).map(EdgeId::face).collect()
+        let merging = self.curves.before_collapse(&self.mesh, e);
+        let gained = match way {
+            Way::Collapse(None) => self.gained_if_busy(e, position),
+            _ => None,
         };
         let (collapse, around) = match way {
             Way::Collapse(disks) => (self.mesh.collapse_between(e, *disks), Vec::new()),
-            Way::Contract(contraction, _) => (
-                self.mesh.contract(contraction),
-                contraction.around().to_vec(),
-            ),
+            Way::Contract(contraction, _) => {
+                debug_assert!(
+                    merging.is_none(),
+                    "curves are kept where the topology is not"
+                );
+                let around = contraction.around().to_vec();
+                (self.mesh.contract(contraction), around)
+            }
         };
+        let gained = gained.map(|mut gained| {
+            gained.retain(|e| self.mesh.is_live_face(e.face()));
+            gained.extend(&collapse.merged_edges);
+            gained
+        });
+        let from = [collapse.removed, collapse.kept].map(|v| self.geometry.position(v));
         self.geometry.set_position(collapse.kept, position);
         if self.is_locked(collapse.removed) {
             self.lock(collapse.kept);
@@ -235,21 +215,24 @@ impl<S: EdgeStore> Surface<S> {
             let of_kept = &mut self.weights[collapse.kept.index()];
             *of_kept = of_kept.max(of_removed);
         }
-        if !creased.is_empty() {
-            for (f, &merged) in collapse.dead_faces.iter().zip(&collapse.merged_edges) {
-                if creased.contains(f) {
-                    for d in self.mesh.edge_star(merged) {
-                        self.creases[d.index()] = true;
-                    }
-                }
-            }
+        if let Some(merging) = merging {
+            self.curves.after_collapse(&self.mesh, &collapse, &merging);
         }
         self.deviation[collapse.kept.index()] = deviation;
         Merged {
             collapse,
             from,
             around,
+            gained,
         }
+    }
+
+    /// Where the vertex that the collapse of `e` leaves is busy and stays where it is: the edges that
+    /// the other one has, each once.
+    fn gained_if_busy(&self, e: EdgeId, position: Vec3) -> Option<Vec<EdgeId>> {
+        let [removed, kept] = self.mesh.collapse_ends(e);
+        let stays = self.geometry.position(kept) == position && self.mesh.is_busy(kept);
+        stays.then(|| self.mesh.vertex_edges(removed).into_vec())
     }
 
     /// What pinching the loop costs: the two caps' area times the squared length of the longest side,
@@ -339,15 +322,10 @@ impl<S: EdgeStore> Surface<S> {
         }
     }
 
-    /// Flips `e`, with the creases around it.
+    /// Flips `e`, which must be no crease.
     pub fn flip(&mut self, e: EdgeId) {
         let sides = self.mesh.flip(e);
-        if !self.creases.is_empty() {
-            let creased = sides.map(|(old, _)| self.creases[old.index()]);
-            for ((_, new), creased) in sides.into_iter().zip(creased) {
-                self.creases[new.index()] = creased;
-            }
-        }
+        self.curves.after_flip(sides);
     }
 
     /// The deviation that the merged vertex would have, or nothing where a face would turn: a
@@ -395,6 +373,15 @@ impl<S: EdgeStore> Surface<S> {
         }
     }
 
+    /// Whether the mesh and what is known of its curves are sound. Linear time.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        self.mesh.check()?;
+        self.curves.check(&self.mesh)
+    }
+
     /// The bytes of connectivity and positions.
     pub fn mesh_bytes(&self) -> usize {
         self.mesh.bytes() + self.geometry.bytes()
@@ -405,7 +392,7 @@ impl<S: EdgeStore> Surface<S> {
         self.locked.capacity()
             + self.seam.capacity()
             + self.double_sided.capacity()
-            + self.creases.capacity()
+            + self.curves.bytes()
             + (self.weights.capacity() + self.deviation.capacity()) * size_of::<f32>()
     }
 }

@@ -143,7 +143,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         }
         let boundary = boundary_weight(options.boundary);
         for e in mesh.faces().flat_map(FaceId::edges) {
-            if mesh.mate(e).is_some() && surface.creases.is_empty() {
+            if mesh.mate(e).is_some() && !surface.curves.are_kept() {
                 continue;
             }
             // A crease is met from both of its faces.

@@ -200,6 +200,7 @@ impl Least<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decimate::curves::Curves;
     use crate::decimate::geometry::{Geometry, scale_to_unit};
 
     /// A surface of nothing but a shape.
@@ -215,7 +216,7 @@ mod tests {
             locked: Vec::new(),
             double_sided: Vec::new(),
             turned: Vec::new(),
-            creases: Vec::new(),
+            curves: Curves::default(),
             weights: Vec::new(),
             seam: Vec::new(),
             lost: 0.0,

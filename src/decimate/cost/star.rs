@@ -94,7 +94,7 @@ impl Star {
     ) {
         let mesh = &surface.mesh;
         let is_open = mesh.mate(start).is_none();
-        if !is_open && surface.creases.is_empty() {
+        if !is_open && !surface.curves.are_kept() {
             return;
         }
         let mut lines = Symmetric::default();
@@ -109,7 +109,7 @@ impl Star {
                 add(e, singular_weight(mesh, e, boundary_weight));
             }
         }
-        if !surface.creases.is_empty() {
+        if surface.curves.are_kept() {
             for e in mesh.fan(start) {
                 let is_crease = mesh.mate(e).is_some() && surface.is_crease(e);
                 add(e, is_crease.then_some(BOUNDARY_WEIGHT));
