@@ -93,6 +93,7 @@ impl Curves {
 
     /// Whether collapsing `e` makes no two curves one. (That none is pinched or pulled off its ends
     /// follows from what is [held](Self::held).)
+    #[inline]
     pub fn stay_apart<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> bool {
         if !self.are_kept() {
             return true;
@@ -102,6 +103,7 @@ impl Curves {
     }
 
     /// What the collapse of `e` will make of the curves, which must [stay apart](Self::stay_apart).
+    #[inline]
     pub fn before_collapse<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> Option<Merging> {
         if !self.are_kept() {
             return None;
