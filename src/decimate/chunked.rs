@@ -549,6 +549,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
             deviation: gather(&flat.deviation, &vertices),
             states: gather(&flat.states, &vertices),
             creased: flat.creased,
+            may_shift: flat.may_shift,
             flags: if flat.flags.is_empty() {
                 Vec::new()
             } else {

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::curves::Curves;
 use super::geometry::{Geometry, Room};
 use super::surface::Surface;
 use super::wedges::FlatWedges;
@@ -64,6 +65,8 @@ pub struct Flat<V> {
     pub wedges: FlatWedges,
     /// Whether creases are kept, though there may be none.
     pub creased: bool,
+    /// Whether they may shift sideways.
+    pub may_shift: bool,
 }
 
 /// The largest weight, relative to the middle one: large enough to leave a vertex for the last, and
@@ -91,6 +94,7 @@ impl<V> Flat<V> {
             flags,
             wedges: FlatWedges::default(),
             creased: false,
+            may_shift: false,
         };
         flat.weigh(parts.weights);
         flat
@@ -166,7 +170,7 @@ impl<V> Flat<V> {
         let surface = Surface {
             locked: self.locked,
             double_sided,
-            creases,
+            curves: Curves::of(&mesh, creases, self.may_shift),
             weights: self.weights,
             deviation,
             lost: 0.0,
@@ -183,7 +187,7 @@ impl<V> Flat<V> {
 impl<S: EdgeStore> Surface<S> {
     /// What is known of a face.
     pub fn flags(&self, f: FaceId) -> FaceFlags {
-        FaceFlags::of(f, &self.double_sided, &self.turned, &self.creases)
+        FaceFlags::of(f, &self.double_sided, &self.turned, self.curves.creases())
     }
 
     /// The arrays of what is left.
@@ -193,7 +197,7 @@ impl<S: EdgeStore> Surface<S> {
         } else {
             Vec::new()
         };
-        let creased = !self.creases.is_empty();
+        let (creased, may_shift) = (self.curves.are_kept(), self.curves.may_shift());
         let wedges = self.wedges.into_flat(&self.mesh);
         let Self {
             mut mesh,
@@ -219,6 +223,7 @@ impl<S: EdgeStore> Surface<S> {
             flags,
             wedges,
             creased,
+            may_shift,
         }
     }
 }

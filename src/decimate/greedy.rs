@@ -9,7 +9,7 @@ use super::queue::{Age, Candidate, Queue};
 use super::report::{Blocked, StopReason, Tally};
 use super::surface::{Loss, Merged, Plan, Surface, Way};
 use crate::error::{Error, Result};
-use crate::mesh::{Disks, EdgeId, EdgeStore, FaceId, Opposite, VertexId};
+use crate::mesh::{Disks, EdgeId, EdgeStore, FaceId, Mesh, Opposite, VertexId};
 use crate::progress::{self, COLLAPSE, Meter};
 
 /// When the loop stops.
@@ -269,7 +269,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 Ok(plan) => {
                     let merged = self.collapse(e, position, &plan);
                     if check {
-                        self.surface.mesh.check().map_err(|wrong| {
+                        self.surface.check().map_err(|wrong| {
                             Error::Internal(format!("after {:?}: {wrong}", merged.collapse))
                         })?;
                         meter.detour(4 * self.surface.mesh.face_slots())?;
@@ -282,7 +282,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                         self.queue_all(|_, _| true, meter)?;
                     } else {
                         if C::IS_LAZY {
-                            self.complete(merged.collapse.kept, candidate.cost);
+                            self.complete(&merged, candidate.cost);
                         }
                         self.reconsider();
                     }
@@ -352,34 +352,24 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     }
 
     /// Outdates the candidates of the edges at a merged vertex, and queues those that have none, at the
-    /// cost of now, which is a lower bound.
+    /// cost of now, which is a lower bound. At a busy one that stayed only of the edges that it gained:
+    /// what the others cost more now they say when they are popped.
     #[inline]
-    fn complete(&mut self, v: VertexId, cost: f32) {
+    fn complete(&mut self, merged: &Merged, cost: f32) {
         let mut edges = std::mem::take(&mut self.edges);
-        let mesh = &self.surface.mesh;
-        for start in mesh.fans(v) {
-            let mut end = None;
-            for e in mesh.fan(start) {
-                let before = mesh.prev(e);
-                let is_queued = match mesh.opposite(e) {
-                    Opposite::Edge(o) => {
-                        let are_queued = [self.queue.outdate(e), self.queue.outdate(o)];
-                        if are_queued == [true; 2] {
-                            self.queue.remove(e.max(o));
-                        }
-                        are_queued != [false; 2]
-                    }
-                    Opposite::Boundary => self.queue.outdate(e),
-                    Opposite::NonManifold(_) => self.queue.outdate(mesh.canonical(e)),
-                };
-                if !is_queued {
-                    edges.push(mesh.canonical(e));
+        let (mesh, queue) = (&self.surface.mesh, &mut self.queue);
+        if let Some(gained) = &merged.gained {
+            edges.extend(gained.iter().filter_map(|&e| outdated(mesh, queue, e)));
+        } else {
+            for start in mesh.fans(merged.collapse.kept) {
+                let mut end = None;
+                for e in mesh.fan(start) {
+                    edges.extend(outdated(mesh, queue, e));
+                    end = Some(mesh.prev(e));
                 }
-                end = Some(before);
+                let end = end.filter(|&end| mesh.mate(end).is_none());
+                edges.extend(end.and_then(|end| outdated(mesh, queue, end)));
             }
-            let end = end.filter(|&end| mesh.mate(end).is_none());
-            let end = end.map(|end| mesh.canonical(end));
-            edges.extend(end.filter(|&e| !self.queue.outdate(e)));
         }
         for edge in edges.drain(..) {
             if self.surface.held(edge) != [true; 2] {
@@ -461,7 +451,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
 
     /// Whether the topology may change here: not where creases are to be kept.
     fn may_simplify(&self) -> bool {
-        self.topology == Topology::Simplify && self.surface.creases.is_empty()
+        self.topology == Topology::Simplify && !self.surface.curves.are_kept()
     }
 
     /// Whether the largest error leaves room for a loss.
@@ -505,7 +495,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             Some(disks) => disks.link_condition(),
             None => mesh.link_condition(e),
         };
-        let way = if keeps_topology && self.surface.crease_condition(e) {
+        let way = if keeps_topology && self.surface.curves.stay_apart(mesh, e) {
             Way::Collapse(disks)
         } else {
             self.contraction(e).ok_or(Rejection::Link)?
@@ -761,7 +751,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
 
     /// The edges that no collapse is asked of, since both ends are held.
     fn locked_edges(&self) -> usize {
-        let nothing_is = self.surface.locked.is_empty() && self.surface.creases.is_empty();
+        let nothing_is = self.surface.locked.is_empty() && !self.surface.curves.are_kept();
         if nothing_is || !self.surface.seam.is_empty() {
             return 0;
         }
@@ -777,6 +767,24 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             + self.changed_at.capacity() * size_of::<u32>();
         self.tally.working_bytes = self.tally.working_bytes.max(bytes);
     }
+}
+
+/// Outdates the candidate of an edge, of two that it has the one by its name; its name, where it has
+/// none.
+#[inline(always)]
+fn outdated<S: EdgeStore, Q: Queue>(mesh: &Mesh<S>, queue: &mut Q, e: EdgeId) -> Option<EdgeId> {
+    let is_queued = match mesh.opposite(e) {
+        Opposite::Edge(o) => {
+            let are_queued = [queue.outdate(e), queue.outdate(o)];
+            if are_queued == [true; 2] {
+                queue.remove(e.max(o));
+            }
+            are_queued != [false; 2]
+        }
+        Opposite::Boundary => queue.outdate(e),
+        Opposite::NonManifold(_) => queue.outdate(mesh.canonical(e)),
+    };
+    (!is_queued).then(|| mesh.canonical(e))
 }
 
 /// The components of a surface by what removing them costs, the cheapest last and the dearest, which

@@ -2,6 +2,7 @@
 
 mod chunked;
 mod cost;
+mod curves;
 mod cut;
 mod fit;
 mod flat;

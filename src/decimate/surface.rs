@@ -1,8 +1,8 @@
 //! A mesh being decimated: connectivity, geometry and what is carried along.
 
 use glam::{DVec3, Vec3};
-use smallvec::SmallVec;
 
+use super::curves::Curves;
 use super::geometry::Geometry;
 use super::options::{AttributeUse, Boundary, Options};
 use super::rules;
@@ -18,6 +18,9 @@ pub struct Merged {
     pub from: [Vec3; 2],
     /// The vertices around that may have lost faces, too, where it was no mere collapse.
     pub around: Vec<VertexId>,
+    /// Where the vertex that is left is busy and stayed where it was: those of its edges that were
+    /// the other's, and those that became one with one of them. All else around it is as it was.
+    pub gained: Option<Vec<EdgeId>>,
 }
 
 /// How an edge is collapsed.
@@ -58,8 +61,8 @@ pub struct Surface<S> {
     pub double_sided: Vec<bool>,
     /// One flag a face that was turned round to agree with its neighbours, or nothing where none was.
     pub turned: Vec<bool>,
-    /// One flag a directed edge that is kept as part of a curve, or nothing where none is.
-    pub creases: Vec<bool>,
+    /// The curves that are kept.
+    pub curves: Curves,
     /// What the corners and faces carry.
     pub wedges: Wedges,
     /// What the cost is multiplied by around each vertex, or nothing where by 1.
@@ -94,7 +97,7 @@ impl<S: EdgeStore> Surface<S> {
 
     /// Whether anything is to be said of faces beside their vertices.
     pub fn has_flags(&self) -> bool {
-        !(self.double_sided.is_empty() && self.turned.is_empty() && self.creases.is_empty())
+        !(self.double_sided.is_empty() && self.turned.is_empty()) || self.curves.are_kept()
     }
 
     /// Locks a vertex.
@@ -120,6 +123,7 @@ impl<S: EdgeStore> Surface<S> {
     }
 
     /// Marks the borders of groups as creases, and attribute seams unless attributes are but carried.
+    /// They may shift sideways, unless other creases are kept, too.
     fn mark_attribute_seams(&mut self, usage: AttributeUse) {
         let (mesh, wedges) = (&self.mesh, &self.wedges);
         let is_kept = |e: EdgeId| match usage {
@@ -129,9 +133,11 @@ impl<S: EdgeStore> Surface<S> {
         let edges = mesh.faces().flat_map(FaceId::edges);
         let kept: Vec<EdgeId> = edges.filter(|&e| is_kept(e)).collect();
         if !kept.is_empty() {
-            self.creases.resize(3 * mesh.face_slots(), false);
-            kept.into_iter()
-                .for_each(|e| self.creases[e.index()] = true);
+            let may_shift = !self.curves.are_kept();
+            let mut creases = self.curves.creases().to_vec();
+            creases.resize(3 * mesh.face_slots(), false);
+            kept.into_iter().for_each(|e| creases[e.index()] = true);
+            self.curves = Curves::of(mesh, creases, may_shift);
         }
     }
 
@@ -171,12 +177,7 @@ impl<S: EdgeStore> Surface<S> {
     /// Whether the edge is kept as part of a curve that is neither boundary nor non-manifold.
     #[inline]
     pub fn is_crease(&self, e: EdgeId) -> bool {
-        self.creases.get(e.index()) == Some(&true)
-    }
-
-    /// Whether the edge is a crease, a boundary or non-manifold.
-    fn is_curve(&self, e: EdgeId) -> bool {
-        self.is_crease(e) || self.mesh.mate(e).is_none()
+        self.curves.is_crease(e)
     }
 
     /// Marks the edges at which the surface turns by more than `degrees` as creases.
@@ -199,15 +200,8 @@ impl<S: EdgeStore> Surface<S> {
                 meter.detour(2 * BLOCK)?;
             }
         }
-        self.creases = creases;
+        self.curves = Curves::of(&self.mesh, creases, false);
         Ok(())
-    }
-
-    /// How many edges at `v` are creases, boundaries or non-manifold: 0 on a smooth piece, 2 on a
-    /// curve, anything else where curves end or meet.
-    pub fn curves_at(&self, v: VertexId) -> usize {
-        let edges = self.mesh.vertex_edges(v);
-        edges.into_iter().filter(|&e| self.is_curve(e)).count()
     }
 
     /// Which ends of `e` stay where they are if it collapses, tail first.
@@ -217,55 +211,44 @@ impl<S: EdgeStore> Surface<S> {
         if !self.seam.is_empty() && (self.is_on_seam(ends[0]) | self.is_on_seam(ends[1])) {
             return [true; 2];
         }
-        if self.locked.is_empty() && self.creases.is_empty() {
+        if self.locked.is_empty() && !self.curves.are_kept() {
             return [false; 2];
         }
-        self.held_by_lock_or_crease(e)
+        self.held_by_lock_or_curve(e)
     }
 
-    fn held_by_lock_or_crease(&self, e: EdgeId) -> [bool; 2] {
-        let ends = self.mesh.edge_vertices(e);
-        let mut held = ends.map(|v| self.is_locked(v));
-        if !self.creases.is_empty() {
-            let free = if self.is_curve(e) { 2 } else { 0 };
-            for (held, v) in held.iter_mut().zip(ends) {
-                *held |= self.curves_at(v) != free;
-            }
+    fn held_by_lock_or_curve(&self, e: EdgeId) -> [bool; 2] {
+        let mut held = self.curves.held(&self.mesh, e);
+        for (held, v) in held.iter_mut().zip(self.mesh.edge_vertices(e)) {
+            *held |= self.is_locked(v);
         }
         held
     }
 
-    /// Whether collapsing `e` keeps the creases: no two of them become one. (That no curve is
-    /// pinched or pulled off its ends follows from what is [held](Self::held).)
-    pub fn crease_condition(&self, e: EdgeId) -> bool {
-        if self.creases.is_empty() {
-            return true;
-        }
-        let mut star = self.mesh.edge_star(e).into_iter();
-        !star.any(|d| self.is_curve(self.mesh.next(d)) && self.is_curve(self.mesh.prev(d)))
-    }
-
     /// Moves the ends of `e` to one position, as one vertex, which takes over what both carried.
     pub fn collapse(&mut self, e: EdgeId, position: Vec3, plan: &Plan) -> Merged {
-        let from = self
-            .mesh
-            .edge_vertices(e)
-            .map(|v| self.geometry.position(v));
-        let beside = |d: EdgeId| [self.mesh.next(d), self.mesh.prev(d)];
-        let has_crease = |d: &EdgeId| beside(*d).into_iter().any(|e| self.is_crease(e));
-        let creased: SmallVec<[FaceId; 2]> = if self.creases.is_empty() {
-            SmallVec::new()
-        } else {
-            let star = self.mesh.edge_star(e).into_iter();
-            star.filter(has_crease).map(EdgeId::face).collect()
+        let merging = self.curves.before_collapse(&self.mesh, e);
+        let gained = match &plan.way {
+            Way::Collapse(None) => self.gained_if_busy(e, position),
+            _ => None,
         };
         let (collapse, around) = match &plan.way {
             Way::Collapse(disks) => (self.mesh.collapse_between(e, *disks), Vec::new()),
-            Way::Contract(contraction, _) => (
-                self.mesh.contract(contraction),
-                contraction.around().to_vec(),
-            ),
+            Way::Contract(contraction, _) => {
+                debug_assert!(
+                    merging.is_none(),
+                    "curves are kept where the topology is not"
+                );
+                let around = contraction.around().to_vec();
+                (self.mesh.contract(contraction), around)
+            }
         };
+        let gained = gained.map(|mut gained| {
+            gained.retain(|e| self.mesh.is_live_face(e.face()));
+            gained.extend(&collapse.merged_edges);
+            gained
+        });
+        let from = [collapse.removed, collapse.kept].map(|v| self.geometry.position(v));
         self.geometry.set_position(collapse.kept, position);
         if self.is_locked(collapse.removed) {
             self.lock(collapse.kept);
@@ -275,14 +258,8 @@ impl<S: EdgeStore> Surface<S> {
             let of_kept = &mut self.weights[collapse.kept.index()];
             *of_kept = of_kept.max(of_removed);
         }
-        if !creased.is_empty() {
-            for (f, &merged) in collapse.dead_faces.iter().zip(&collapse.merged_edges) {
-                if creased.contains(f) {
-                    for d in self.mesh.edge_star(merged) {
-                        self.creases[d.index()] = true;
-                    }
-                }
-            }
+        if let Some(merging) = merging {
+            self.curves.after_collapse(&self.mesh, &collapse, &merging);
         }
         if !self.wedges.is_empty() {
             self.wedges.adopt(&self.mesh, collapse.kept, &plan.carried);
@@ -292,7 +269,16 @@ impl<S: EdgeStore> Surface<S> {
             collapse,
             from,
             around,
+            gained,
         }
+    }
+
+    /// Where the vertex that the collapse of `e` leaves is busy and stays where it is: the edges that
+    /// the other one has, each once.
+    fn gained_if_busy(&self, e: EdgeId, position: Vec3) -> Option<Vec<EdgeId>> {
+        let [removed, kept] = self.mesh.collapse_ends(e);
+        let stays = self.geometry.position(kept) == position && self.mesh.is_busy(kept);
+        stays.then(|| self.mesh.vertex_edges(removed).into_vec())
     }
 
     /// What pinching the loop costs: the two caps' area times the squared length of the longest side,
@@ -396,18 +382,13 @@ impl<S: EdgeStore> Surface<S> {
         }
     }
 
-    /// Flips `e`, with the creases around it.
+    /// Flips `e`, which must be no crease.
     pub fn flip(&mut self, e: EdgeId) {
         let sides = self.mesh.flip(e);
         if !self.wedges.is_empty() {
             self.wedges.flip(&self.mesh, e, &sides);
         }
-        if !self.creases.is_empty() {
-            let creased = sides.map(|(old, _)| self.creases[old.index()]);
-            for ((_, new), creased) in sides.into_iter().zip(creased) {
-                self.creases[new.index()] = creased;
-            }
-        }
+        self.curves.after_flip(sides);
     }
 
     /// The deviation that the merged vertex would have, or nothing where a face would turn: a
@@ -455,6 +436,15 @@ impl<S: EdgeStore> Surface<S> {
         }
     }
 
+    /// Whether the mesh and what is known of its curves are sound. Linear time.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        self.mesh.check()?;
+        self.curves.check(&self.mesh)
+    }
+
     /// The bytes of connectivity and positions.
     pub fn mesh_bytes(&self) -> usize {
         self.mesh.bytes() + self.geometry.bytes()
@@ -465,7 +455,7 @@ impl<S: EdgeStore> Surface<S> {
         self.locked.capacity()
             + self.seam.capacity()
             + self.double_sided.capacity()
-            + self.creases.capacity()
+            + self.curves.bytes()
             + self.wedges.bytes()
             + (self.weights.capacity() + self.deviation.capacity()) * size_of::<f32>()
     }

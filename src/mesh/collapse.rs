@@ -10,26 +10,15 @@ use super::{EdgeId, EdgeStore, FaceId, Mesh, OppositeWord, VertexId};
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Collapse {
-    /// The vertex that is left (the collapsed edge's head).
+    /// The vertex that is left (the collapsed edge's head; its tail where that alone is
+    /// [busy](Mesh::is_busy)).
     pub kept: VertexId,
-    /// The vertex that is gone (its tail).
+    /// The vertex that is gone (its tail; its head).
     pub removed: VertexId,
     /// The faces that are gone, one for each directed edge of the collapsed edge.
     pub dead_faces: SmallVec<[FaceId; 2]>,
     /// One surviving directed edge of each pair of edges that became one.
     pub merged_edges: SmallVec<[EdgeId; 2]>,
-}
-
-/// How far the surroundings of a vertex are from a disk (Dey et al. 1999, section 3).
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Order {
-    /// A disk.
-    Disk,
-    /// Sheets that meet along one curve through the vertex: a boundary (one sheet), a
-    /// non-manifold curve (several).
-    Curve,
-    /// Anything else: a bow-tie, the end or branching of a non-manifold curve.
-    Point,
 }
 
 type Neighbours = SmallVec<[VertexId; 24]>;
@@ -46,7 +35,11 @@ impl<S: EdgeStore> Mesh<S> {
     /// - the common neighbours of both ends are the apexes of the faces at `e`;
     /// - no edge lies across from both ends (a tetrahedron, a pillow).
     ///
-    /// Costs one walk around each end.
+    /// Where an end and another vertex next to both are so busy that nobody knows whether both are next
+    /// to each other, it says no.
+    ///
+    /// Costs one walk around the end with fewer neighbours and around its neighbours, or around both
+    /// ends where neither is much busier; for a non-manifold edge around both.
     #[inline]
     pub fn link_condition(&self, e: EdgeId) -> bool {
         match self.disks(e) {
@@ -58,21 +51,26 @@ impl<S: EdgeStore> Mesh<S> {
     /// [`link_condition`](Self::link_condition), of any edge.
     pub(super) fn general_link_condition(&self, e: EdgeId) -> bool {
         let [u, v] = self.edge_vertices(e);
-        let star = self.edge_star(e);
         let is_singular = |e| self.mate(e).is_none();
+        // What costs little first: a walk around all fans of a busy vertex comes after one around the
+        // only fan of the other end, and both before a look at all faces of the edge.
+        let are_both_far = if is_singular(e) {
+            let [first, second] = match self.outgoing(u) {
+                Outgoing::Fans(_) => [v, u],
+                _ => [u, v],
+            };
+            self.is_singular_point(first) && self.is_singular_point(second)
+        } else {
+            !self.is_disk(u) && !self.is_disk(v)
+        };
+        if are_both_far {
+            return false;
+        }
+        let star = self.edge_star(e);
         if star
             .iter()
             .any(|&d| is_singular(self.next(d)) && is_singular(self.prev(d)))
         {
-            return false;
-        }
-        let (order_u, order_v) = (self.order(u), self.order(v));
-        let limit = if is_singular(e) {
-            Order::Point
-        } else {
-            Order::Curve
-        };
-        if order_u >= limit && order_v >= limit {
             return false;
         }
         let apexes: Neighbours = star.iter().map(|&d| self.apex(d)).collect();
@@ -81,9 +79,9 @@ impl<S: EdgeStore> Mesh<S> {
 
     /// Whether a vertex other than the apexes lies next to both ends.
     ///
-    /// Walks both ends in turns until one is done. Where the other end is busy, it is asked from
-    /// the neighbours of the first instead, so that a vertex of valence 100 000 does not cost its
-    /// valence for each of its edges.
+    /// Walks both ends in turns until one is done. Where the other end is busier by far, it is asked
+    /// from the neighbours of the first instead, so that a vertex of valence 100 000 does not cost its
+    /// valence for each of its edges. Says yes where nobody knows.
     fn has_other_common_neighbour(&self, u: VertexId, v: VertexId, apexes: &Neighbours) -> bool {
         let (mut at_u, mut at_v) = (self.neighbours(u), self.neighbours(v));
         let (mut around_u, mut around_v) = (Neighbours::new(), Neighbours::new());
@@ -97,89 +95,119 @@ impl<S: EdgeStore> Mesh<S> {
                 None => break (&mut around_v, u),
             }
         };
-        if !few.spilled() {
-            let is_other = |x: &VertexId| !apexes.contains(x);
-            let mut around_busy = self.neighbours(busy);
-            let mut first = around_busy.by_ref().take(4 * few.len());
-            if first.any(|x| few.contains(&x) && is_other(&x)) {
-                return true;
-            }
-            let mut others = few.iter().filter(|x| is_other(x));
-            return around_busy.next().is_some()
-                && others.any(|&x| self.neighbours(x).any(|y| y == busy));
-        }
-        few.sort_unstable();
         let mut apexes = apexes.clone();
-        apexes.sort_unstable();
-        self.neighbours(busy)
-            .any(|x| few.binary_search(&x).is_ok() && apexes.binary_search(&x).is_err())
+        let is_sorted = few.spilled();
+        if is_sorted {
+            few.sort_unstable();
+            apexes.sort_unstable();
+        }
+        let has = |list: &Neighbours, x: VertexId| {
+            if is_sorted {
+                list.binary_search(&x).is_ok()
+            } else {
+                list.contains(&x)
+            }
+        };
+        let mut around_busy = self.neighbours(busy);
+        let mut first = around_busy.by_ref().take(4 * few.len());
+        if first.any(|x| has(few, x) && !has(&apexes, x)) {
+            return true;
+        }
+        let mut others = few.iter().filter(|&&x| x != busy && !has(&apexes, x));
+        around_busy.next().is_some() && others.any(|&x| self.are_joined(x, busy) != Some(false))
     }
 
     /// Whether two apexes are joined by an edge that has a face with `u` and one with `v`.
     ///
-    /// Such an edge lies across from `u` in one of the two faces beside a face at the edge; so only
-    /// those are looked at.
+    /// Such an edge lies across from `u` in one of the two faces beside a face at the edge, and across
+    /// from `v`; so only those at one end are looked at.
     fn has_common_link_edge(&self, u: VertexId, v: VertexId, star: &[EdgeId]) -> bool {
         if star.len() < 2 {
             return false;
         }
         let mut apexes: SmallVec<[VertexId; 4]> = star.iter().map(|&d| self.apex(d)).collect();
         apexes.sort_unstable();
-        // Pairs of apexes that have a face with `center`: across the side from `center` to an apex.
-        let pairs_at = |center: VertexId| {
-            let mut pairs: SmallVec<[[VertexId; 2]; 4]> = SmallVec::new();
-            for &d in star {
+        let sides_at = |center: VertexId| {
+            star.iter().map(move |&d| {
                 let [behind, before] = [self.next(d), self.prev(d)];
-                let side = if self.tail(behind) == center {
+                if self.tail(behind) == center {
                     behind
                 } else {
                     before
-                };
-                let x = self.apex(d);
-                for beside in self.edge_star(side) {
-                    let y = self.apex(beside);
-                    if y != x && apexes.binary_search(&y).is_ok() {
-                        pairs.push([x.min(y), x.max(y)]);
-                    }
                 }
-            }
-            pairs.sort_unstable();
-            pairs
+            })
         };
-        let at_u = pairs_at(u);
-        !at_u.is_empty()
-            && pairs_at(v)
-                .iter()
-                .any(|pair| at_u.binary_search(pair).is_ok())
+        // From the end beside which fewer faces lie: a side may be the spine of a book.
+        let [at_u, at_v] = [u, v].map(|center| {
+            sides_at(center)
+                .map(|e| self.edge_face_count(e))
+                .sum::<usize>()
+        });
+        let [center, other] = if at_u <= at_v { [u, v] } else { [v, u] };
+        sides_at(center).zip(star).any(|(side, &d)| {
+            let x = self.apex(d);
+            self.edge_star(side).into_iter().any(|beside| {
+                // The face of `center`, x and y: has the edge across from `center` a face with the
+                // other end, too?
+                let y = self.apex(beside);
+                let across = if self.tail(beside) == center {
+                    self.next(beside)
+                } else {
+                    self.prev(beside)
+                };
+                y != x
+                    && apexes.binary_search(&y).is_ok()
+                    && self
+                        .edge_star(across)
+                        .into_iter()
+                        .any(|d| self.apex(d) == other)
+            })
+        })
     }
 
-    /// How far the surroundings of `v` are from a disk. Constant time at a single fan; else a walk,
-    /// until two fans disagree.
-    fn order(&self, v: VertexId) -> Order {
+    /// Whether the surroundings of `v` are a disk (Dey et al. 1999, section 3: of order 0).
+    fn is_disk(&self, v: VertexId) -> bool {
+        matches!(self.outgoing(v), Outgoing::Fan(start) if self.mate(start).is_some())
+    }
+
+    /// Whether the surroundings of `v` are neither a disk nor sheets that meet along one curve through
+    /// it, a boundary (one sheet) or a non-manifold curve (several): a bow-tie, the end or branching of
+    /// a non-manifold curve (of order 2).
+    ///
+    /// Constant time at a single fan; else a walk, until two fans disagree.
+    fn is_singular_point(&self, v: VertexId) -> bool {
         if let Outgoing::Fan(start) = self.outgoing(v) {
-            return match self.opposite(start) {
-                Opposite::Edge(_) => Order::Disk,
-                Opposite::Boundary => Order::Curve,
-                // The fan ends where it began.
-                Opposite::NonManifold(_) => Order::Point,
-            };
+            // A fan that begins at a non-manifold edge ends where it began.
+            return matches!(self.opposite(start), Opposite::NonManifold(_));
         }
         let mut curve: Option<[VertexId; 2]> = None;
         for start in self.fans(v) {
             if self.mate(start).is_some() {
-                return Order::Point;
+                return true;
             }
             let (a, b) = (self.head(start), self.tail(self.fan_end(start)));
             let ends = [a.min(b), a.max(b)];
             if a == b || curve.is_some_and(|c| c != ends) {
-                return Order::Point;
+                return true;
             }
             curve = Some(ends);
         }
-        Order::Curve
+        false
     }
 
-    /// Collapses `e`: moves its tail onto its head.
+    /// The vertex that the collapse of `e` removes and the one that it leaves: the tail and the head,
+    /// unless the tail alone is [busy](Self::is_busy).
+    pub fn collapse_ends(&self, e: EdgeId) -> [VertexId; 2] {
+        let [tail, head] = self.edge_vertices(e);
+        if self.is_busy(tail) && !self.is_busy(head) {
+            [head, tail]
+        } else {
+            [tail, head]
+        }
+    }
+
+    /// Collapses `e`: moves its tail onto its head, or, where the tail alone is busy, its head onto its
+    /// tail.
     ///
     /// ```text
     ///        vl
@@ -189,7 +217,8 @@ impl<S: EdgeStore> Mesh<S> {
     ///        vr
     /// ```
     ///
-    /// Needs [`link_condition(e)`](Self::link_condition). Costs a walk around both ends.
+    /// Needs [`link_condition(e)`](Self::link_condition). Costs a walk around both ends, or around the
+    /// one that is not busy, and around the fans at the other that lose a face.
     pub fn collapse(&mut self, e: EdgeId) -> Collapse {
         let disks = self.disks(e);
         self.collapse_between(e, disks.as_ref())
@@ -210,7 +239,7 @@ impl<S: EdgeStore> Mesh<S> {
 
     /// [`collapse`](Self::collapse), of any edge.
     pub(super) fn general_collapse(&mut self, e: EdgeId) -> Collapse {
-        let [removed, kept] = self.edge_vertices(e);
+        let [removed, kept] = self.collapse_ends(e);
         let star = self.edge_star(e);
         let fans_are_simple = star.len() <= 2
             && !matches!(self.opposite(e), Opposite::NonManifold(_))
@@ -224,17 +253,16 @@ impl<S: EdgeStore> Mesh<S> {
         };
         let mut survivors: SmallVec<[EdgeId; 24]> = self.outgoing_edges(removed).collect();
         if !fans_are_simple {
-            let of_kept: SmallVec<[EdgeId; 24]> = self.outgoing_edges(kept).collect();
-            survivors.extend(of_kept);
             self.free_fans(removed);
-            self.free_fans(kept);
+            self.take_fans_beside(&star, kept, &mut survivors);
         }
         survivors.retain(|e| !is_dead(*e));
-        let is_closed = fans_are_simple
-            && [removed, kept].iter().all(|&v| match self.outgoing(v) {
-                Outgoing::Fan(start) => self.mate(start).is_some(),
-                _ => false,
-            });
+        let starts: SmallVec<[EdgeId; 2]> = if fans_are_simple {
+            self.fans(removed).chain(self.fans(kept)).collect()
+        } else {
+            SmallVec::new()
+        };
+        let is_closed = starts.iter().all(|&start| self.mate(start).is_some());
 
         if let Opposite::NonManifold(row) = self.opposite(e) {
             self.edge_rows.remove(row);
@@ -262,12 +290,13 @@ impl<S: EdgeStore> Mesh<S> {
             let start = if is_closed {
                 leaving
             } else {
-                self.fan_start(leaving)
+                // Where the open fan of one end began, the one of both does.
+                let begins = |e: &EdgeId| !is_dead(*e) && self.mate(*e).is_none();
+                let before = starts.into_iter().find(begins);
+                before.unwrap_or_else(|| self.fan_start(leaving))
             };
             self.set_outgoing(kept, Outgoing::Fan(start));
         } else {
-            self.set_outgoing(kept, Outgoing::None);
-            self.live_vertices -= 1;
             self.find_fans_among(kept, &mut survivors);
         }
         Collapse {
@@ -281,6 +310,50 @@ impl<S: EdgeStore> Mesh<S> {
     pub(super) fn free_fans(&mut self, v: VertexId) {
         if let Outgoing::Fans(row) = self.outgoing(v) {
             self.fan_rows.remove(row);
+        }
+    }
+
+    /// Takes from `v` the fans in which faces of `star` lie, and gives their outgoing edges; all fans
+    /// where `v` is not busy, so that each begins at its smallest edge when it is found again.
+    fn take_fans_beside(
+        &mut self,
+        star: &[EdgeId],
+        v: VertexId,
+        outgoing: &mut SmallVec<[EdgeId; 24]>,
+    ) {
+        let row = match self.outgoing(v) {
+            Outgoing::Fans(row) if self.is_busy(v) => row,
+            fans => {
+                outgoing.extend(self.outgoing_edges(v).collect::<Vec<_>>());
+                self.free_fans(v);
+                self.live_vertices -= usize::from(fans != Outgoing::None);
+                self.set_outgoing(v, Outgoing::None);
+                return;
+            }
+        };
+        for &d in star {
+            let leaving = if self.tail(d) == v { d } else { self.next(d) };
+            let start = self.fan_start(leaving);
+            let named = self
+                .fan(start)
+                .find(|e| self.fan_rows.row(row).binary_search(e).is_ok());
+            // Two faces may lie in one fan.
+            if let Some(name) = named {
+                outgoing.extend(self.fan(start).collect::<Vec<_>>());
+                self.fan_rows.take(row, name);
+            }
+        }
+        match *self.fan_rows.row(row) {
+            [] => {
+                self.fan_rows.remove(row);
+                self.live_vertices -= 1;
+                self.set_outgoing(v, Outgoing::None);
+            }
+            [only] => {
+                self.fan_rows.remove(row);
+                self.set_outgoing(v, Outgoing::Fan(only));
+            }
+            _ => {}
         }
     }
 
@@ -321,7 +394,7 @@ impl<S: EdgeStore> Mesh<S> {
         }
     }
 
-    /// Finds the fans of `v`, whose outgoing edges are these.
+    /// Finds the fans of `v` in which these edges lie, all that leave it but those of fans it has.
     pub(super) fn find_fans_among(&mut self, v: VertexId, outgoing: &mut [EdgeId]) {
         outgoing.sort_unstable();
         let mut seen: SmallVec<[bool; 24]> = SmallVec::from_elem(false, outgoing.len());
@@ -336,10 +409,10 @@ impl<S: EdgeStore> Mesh<S> {
                     .expect("a fan's edges leave its vertex");
                 seen[at] = true;
             }
-            self.add_fan(v, start);
-        }
-        if let Outgoing::Fans(row) = self.outgoing(v) {
-            self.fan_rows.sort(row);
+            match self.outgoing(v) {
+                Outgoing::Fans(row) => self.fan_rows.put(row, start),
+                _ => self.add_fan(v, start),
+            }
         }
     }
 }

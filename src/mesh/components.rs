@@ -1,30 +1,52 @@
 //! Components: faces that hang together through vertices.
 
 use super::link::{Opposite, Outgoing};
-use super::{EdgeStore, FaceId, Mesh, OppositeWord};
+use super::{EdgeStore, FaceId, Mesh, OppositeWord, VertexId};
+
+/// What was met.
+struct Seen {
+    faces: Vec<bool>,
+    vertices: Vec<bool>,
+}
+
+impl Seen {
+    /// Says of each face once that it is new.
+    fn is_new_face(&mut self, f: FaceId) -> bool {
+        !std::mem::replace(&mut self.faces[f.index()], true)
+    }
+
+    /// Says of each vertex once that it is new.
+    fn is_new_vertex(&mut self, v: VertexId) -> bool {
+        !std::mem::replace(&mut self.vertices[v.index()], true)
+    }
+}
 
 impl<S: EdgeStore> Mesh<S> {
-    /// The faces that hang together, through vertices, component by component.
+    /// The faces that hang together, through vertices, component by component. Linear time.
     pub fn components(&self) -> Vec<Vec<FaceId>> {
-        let mut seen = vec![false; self.face_slots()];
         let mut components = Vec::new();
+        let mut seen = Seen {
+            faces: vec![false; self.face_slots()],
+            vertices: vec![false; self.vertex_slots()],
+        };
         for f in self.faces() {
-            if !seen[f.index()] {
-                components.push(self.flood(f, |g| !std::mem::replace(&mut seen[g.index()], true)));
+            if seen.is_new_face(f) {
+                components.push(self.flood(f, &mut seen));
             }
         }
         components
     }
 
-    /// The faces that hang together with `f`; `is_new` says of each once that it is.
-    fn flood(&self, f: FaceId, mut is_new: impl FnMut(FaceId) -> bool) -> Vec<FaceId> {
-        is_new(f);
+    /// The faces that hang together with `f`. Walks around each vertex once.
+    fn flood(&self, f: FaceId, seen: &mut Seen) -> Vec<FaceId> {
         let mut component = vec![f];
         let mut at = 0;
         while let Some(&f) = component.get(at) {
             at += 1;
             for v in self.face_vertices(f) {
-                component.extend(self.vertex_faces(v).filter(|&g| is_new(g)));
+                if seen.is_new_vertex(v) {
+                    component.extend(self.vertex_faces(v).filter(|&g| seen.is_new_face(g)));
+                }
             }
         }
         component

@@ -67,11 +67,15 @@ impl<S: EdgeStore> Mesh<S> {
     /// collapse it: the faces at `e` go; of two faces that come to lie on each other one goes, or
     /// both where no other face is at one of their edges; edges that come to lie on each other become
     /// one. Nothing where an edge or a vertex would become non-manifold (or more so), or an edge a
-    /// boundary.
+    /// boundary, and at or beside a [busy](Self::is_busy) vertex.
     ///
     /// Costs a walk around both ends and around all of their neighbours.
     pub fn contraction(&self, e: EdgeId) -> Option<Contraction> {
         let [removed, kept] = self.edge_vertices(e);
+        let mut ends = [removed, kept].into_iter();
+        if ends.any(|v| self.is_busy(v) || self.neighbours(v).any(|x| self.is_busy(x))) {
+            return None;
+        }
         let rename = |v: VertexId| if v == removed { kept } else { v };
         let mut faces: Vec<FaceId> = self.vertex_faces(removed).collect();
         faces.extend(self.vertex_faces(kept));

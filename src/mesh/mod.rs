@@ -155,6 +155,15 @@ impl<S: EdgeStore> Mesh<S> {
         }
     }
 
+    /// The number of faces at the edge that `e` is part of.
+    fn edge_face_count(&self, e: EdgeId) -> usize {
+        match self.opposite(e) {
+            Opposite::Edge(_) => 2,
+            Opposite::Boundary => 1,
+            Opposite::NonManifold(row) => self.edge_rows.row(row).len(),
+        }
+    }
+
     /// All faces that share an edge (EF).
     pub fn edge_faces(&self, e: EdgeId) -> SmallVec<[FaceId; 2]> {
         self.edge_star(e).into_iter().map(EdgeId::face).collect()

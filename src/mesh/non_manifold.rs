@@ -40,14 +40,9 @@ impl SideTable {
         &self.rows[row.index()]
     }
 
-    /// Adds one edge at the end of a row, which must be [sorted](Self::sort) before it is asked.
+    /// Adds one edge at the end of a row, which must be [sorted](Self::sort_all) before it is asked.
     pub fn push(&mut self, row: RowId, edge: EdgeId) {
         self.rows[row.index()].push(edge);
-    }
-
-    /// Puts a row in ascending order.
-    pub fn sort(&mut self, row: RowId) {
-        self.rows[row.index()].sort_unstable();
     }
 
     /// Puts every row in ascending order.
@@ -57,13 +52,24 @@ impl SideTable {
 
     /// Puts `new` in the place of `old`, which must be in the row.
     pub fn replace(&mut self, row: RowId, old: EdgeId, new: EdgeId) {
+        self.take(row, old);
+        self.put(row, new);
+    }
+
+    /// Puts one edge more into a row, in its place.
+    pub fn put(&mut self, row: RowId, new: EdgeId) {
+        let edges = &mut self.rows[row.index()];
+        let at = edges.partition_point(|&e| e < new);
+        edges.insert(at, new);
+    }
+
+    /// Takes `old`, which must be in the row, out of it.
+    pub fn take(&mut self, row: RowId, old: EdgeId) {
         let edges = &mut self.rows[row.index()];
         let at = edges
             .binary_search(&old)
             .expect("the row lists the edge that it is asked for");
         edges.remove(at);
-        let at = edges.partition_point(|&e| e < new);
-        edges.insert(at, new);
     }
 
     /// The rows in use.

@@ -12,19 +12,20 @@ impl<S: EdgeStore> Mesh<S> {
     /// The loops of three edges through `e` that no face fills: all three edges and their vertices
     /// manifold and off the boundary, each loop as directed edges in order, `e` first.
     ///
-    /// Costs a walk around one end and around all of its neighbours.
+    /// None at or beside a [busy](Self::is_busy) vertex. Costs a walk around one end and around all of
+    /// its neighbours.
     pub fn open_loops(&self, e: EdgeId) -> SmallVec<[[EdgeId; 3]; 1]> {
         let mut loops = SmallVec::new();
         let Some(o) = self.mate(e) else { return loops };
         let [u, v] = self.edge_vertices(e);
         let is_disk = |x: VertexId| matches!(self.outgoing(x), Outgoing::Fan(start) if self.mate(start).is_some());
-        if !is_disk(u) || !is_disk(v) {
+        if !is_disk(u) || !is_disk(v) || self.is_busy(v) {
             return loops;
         }
         let apexes = [self.apex(e), self.apex(o)];
         for to_x in self.outgoing_edges(v) {
             let x = self.head(to_x);
-            if x == u || apexes.contains(&x) || !is_disk(x) {
+            if x == u || apexes.contains(&x) || !is_disk(x) || self.is_busy(x) {
                 continue;
             }
             let back = self.outgoing_edges(x).find(|&d| self.head(d) == u);

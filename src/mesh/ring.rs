@@ -6,6 +6,9 @@ use super::link::Outgoing;
 use super::{EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 use smallvec::SmallVec;
 
+/// The faces of a busy vertex, and more.
+const BUSY: usize = 192;
+
 /// The outgoing edges of one fan, in the order of the walk `e → opposite(prev(e))`.
 ///
 /// ```text
@@ -205,6 +208,25 @@ impl<S: EdgeStore> Mesh<S> {
         let OutgoingEdges { fan, others } = self.walk(v);
         let end = None;
         Neighbours { fan, end, others }
+    }
+
+    /// Whether `v` has so many faces that not every edge at it can afford a walk around it. Looks at
+    /// no more than that.
+    pub fn is_busy(&self, v: VertexId) -> bool {
+        self.outgoing_edges(v).nth(BUSY - 1).is_some()
+    }
+
+    /// Whether an edge joins `a` and `b`. Walks around both in turns until one is done; nothing where
+    /// neither is after as many steps as a busy vertex has faces.
+    pub(super) fn are_joined(&self, a: VertexId, b: VertexId) -> Option<bool> {
+        let (mut at_a, mut at_b) = (self.neighbours(a), self.neighbours(b));
+        for _ in 0..BUSY {
+            match (at_a.next(), at_b.next()) {
+                (Some(x), Some(y)) if x != b && y != a => {}
+                (x, y) => return Some(x == Some(b) || y == Some(a)),
+            }
+        }
+        None
     }
 
     /// The walk around `v`, before its first step.

@@ -561,6 +561,91 @@ fn busy_vertices_and_edges_are_built_and_checked<S: EdgeStore>() {
     assert_eq!(mesh.non_manifold_edge_count(), 1);
 }
 
+/// A vertex with more than 192 faces in fans of every kind: two closed ones and two open ones, each
+/// with a ring of faces around it, lone triangles, and pages of two faces on two edges.
+fn hub_of_many_fans() -> (usize, Vec<[u32; 3]>) {
+    let (mut vertices, mut triangles) = (1, Vec::new());
+    for (spokes, is_closed) in [(60, true), (40, true), (50, false), (12, false)] {
+        let rim = |i: u32| vertices + i % spokes;
+        let outer = |i: u32| vertices + spokes + i % spokes;
+        for i in 0..if is_closed { spokes } else { spokes - 1 } {
+            triangles.extend([
+                [0, rim(i), rim(i + 1)],
+                [rim(i), outer(i), rim(i + 1)],
+                [rim(i + 1), outer(i), outer(i + 1)],
+            ]);
+        }
+        vertices += 2 * spokes;
+    }
+    for _ in 0..10 {
+        triangles.push([0, vertices, vertices + 1]);
+        vertices += 2;
+    }
+    for pages in [8, 25] {
+        let spine = vertices;
+        vertices += 1;
+        for page in 0..pages {
+            let (a, b) = (vertices, vertices + 1);
+            let first = if page % 3 == 0 {
+                [spine, 0, a]
+            } else {
+                [0, spine, a]
+            };
+            triangles.extend([first, [a, first[1], b]]);
+            vertices += 2;
+        }
+    }
+    (vertices as usize, triangles)
+}
+
+/// A collapse at a busy vertex leaves the fans alone that lose no face: all tables stay what a rebuild
+/// gives, and all that a homeomorphism keeps. The busy vertex is the one that is left, whichever way
+/// the edge runs.
+fn collapses_at_a_busy_vertex_keep_tables_and_topology<S: EdgeStore>() {
+    let (vertices, triangles) = hub_of_many_fans();
+    let before = topology(&triangles);
+    let hub = VertexId::new(0);
+    let mesh = Mesh::<S>::from_triangles(vertices, &triangles);
+    assert!(mesh.is_busy(hub) && mesh.multi_fan_vertex_count() > 0);
+    let spokes = live_edges(&mesh).into_iter().filter(|&e| {
+        let ends = mesh.edge_vertices(e);
+        ends.contains(&hub) && mesh.link_condition(e)
+    });
+    let mut collapsed = 0;
+    for e in spokes.flat_map(|e| mesh.edge_star(e)) {
+        let mut after = mesh.clone();
+        assert_eq!(after.collapse(e).kept, hub);
+        after
+            .check()
+            .unwrap_or_else(|wrong| panic!("{e:?}: {wrong}"));
+        assert_eq!(topology(&after.triangles()), before, "{e:?}");
+        collapsed += 1;
+    }
+    assert!(collapsed > 100, "{collapsed}");
+    for seed in 1..4 {
+        let mut mesh = mesh.clone();
+        collapse_at_random(&mut mesh, &mut Random(seed));
+        assert_eq!(topology(&mesh.triangles()), before, "seed {seed}");
+    }
+}
+
+/// 50 000 faces around each of two vertices: the components, the link condition of every spoke, which
+/// has both next to its rim, and what a change of the topology would do take no quadratic time.
+fn every_spoke_is_asked_quickly<S: EdgeStore>() {
+    let n = 50_000;
+    let (a, b) = (n, n + 1);
+    let cones = (0..n).flat_map(|i| [[a, i, (i + 1) % n], [b, (i + 1) % n, i]]);
+    let cones: Vec<[u32; 3]> = cones.collect();
+    let mesh = Mesh::<S>::from_triangles(n as usize + 2, &cones);
+    assert_eq!(mesh.components().len(), 1);
+    for e in mesh.edges() {
+        let ends = mesh.edge_vertices(e).map(|v| v.index() as u32);
+        let is_spoke = ends.contains(&a) || ends.contains(&b);
+        assert_eq!(mesh.link_condition(e), !is_spoke, "{e:?}");
+        assert!(mesh.contraction(e).is_none() && mesh.open_loops(e).is_empty());
+    }
+}
+
 /// `check` finds each kind of lie that a wrong collapse could leave.
 fn check_finds_what_is_wrong<S: EdgeStore>() {
     let (positions, triangles) = shapes::three_fins(3);
@@ -828,5 +913,7 @@ for_each_tier!(
     boundary_curves_are_loops_or_run_between_fins,
     compact_keeps_the_mesh,
     busy_vertices_and_edges_are_built_and_checked,
+    collapses_at_a_busy_vertex_keep_tables_and_topology,
+    every_spoke_is_asked_quickly,
     check_finds_what_is_wrong,
 );

@@ -7,8 +7,8 @@ use wide::f32x4;
 use super::attributes::{AttributeForms, carried};
 use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
-    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, doubles, each,
-    part, places, singular_weight,
+    BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, crease_weight,
+    doubles, each, part, places, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
@@ -151,11 +151,11 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         }
         let boundary = boundary_weight(options.boundary);
         for e in mesh.faces().flat_map(FaceId::edges) {
-            if mesh.mate(e).is_some() && surface.creases.is_empty() {
+            if mesh.mate(e).is_some() && !surface.curves.are_kept() {
                 continue;
             }
             // A crease is met from both of its faces.
-            let of_crease = Some(BOUNDARY_WEIGHT / 2.0).filter(|_| surface.is_crease(e));
+            let of_crease = Some(crease_weight(surface) / 2.0).filter(|_| surface.is_crease(e));
             let of_singular = || singular_weight(mesh, e, boundary).filter(|_| !surface.is_rim(e));
             if let Some(weight) = of_crease.or_else(of_singular) {
                 let [v, w] = mesh.edge_vertices(e);

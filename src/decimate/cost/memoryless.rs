@@ -321,23 +321,32 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         let kept = merged.collapse.kept;
         changed.clear();
         changed.push(kept);
-        changed.extend(surface.mesh.neighbours(kept));
-        changed.extend(&merged.around);
-        if !merged.around.is_empty() || surface.mesh.is_non_manifold_vertex(kept) {
+        let gained = merged.gained.as_deref();
+        if let Some(gained) = gained {
+            let ends = gained.iter().flat_map(|&e| surface.mesh.edge_vertices(e));
+            changed.extend(ends.filter(|&x| x != kept));
+        } else {
+            changed.extend(surface.mesh.neighbours(kept));
+            changed.extend(&merged.around);
+        }
+        if gained.is_some()
+            || !merged.around.is_empty()
+            || surface.mesh.is_non_manifold_vertex(kept)
+        {
             // A vertex where many fans end is met once for each, one around maybe twice.
             changed[1..].sort_unstable();
             changed.dedup();
         }
         changed.retain(|&x| {
             let tensor = &mut self.tensors[x.index()];
-            let lags = x != kept && tensor.left > 0;
+            let lags = (x != kept || gained.is_some()) && tensor.left > 0;
             tensor.left -= u16::from(lags);
             !lags
         });
         if let Some(attributes) = &mut self.attributes {
             attributes.update(surface, changed);
         }
-        let is_exact = surface.mesh.face_count() < self.exact_below;
+        let is_exact = gained.is_some() || surface.mesh.face_count() < self.exact_below;
         let mut listed = 0;
         for first in (0..changed.len()).step_by(LANES) {
             let last = changed.len().min(first + LANES);
@@ -367,6 +376,14 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         changed.extend(around.flat_map(|&v| surface.mesh.neighbours(v)));
         changed.sort_unstable();
         changed.dedup();
+        // A hub beside a gap does not cost its valence for each face that closes some of it.
+        changed.retain(|x| {
+            let tensor = &mut self.tensors[x.index()];
+            let is_beside = !cut.as_flattened().contains(x);
+            let lags = is_beside && tensor.is_heavy() && tensor.left > 0;
+            tensor.left -= u16::from(lags);
+            !lags
+        });
         if let Some(attributes) = &mut self.attributes {
             attributes.update(surface, changed);
         }

@@ -117,6 +117,22 @@ pub(super) const LINE_WEIGHT: f64 = 2.25;
 /// error 2 to 6 times smaller for 0 to 4 % of surface rms.
 pub(super) const BOUNDARY_WEIGHT: f64 = 8.0;
 
+/// The weight of a crease that may shift sideways.
+const SEAM_WEIGHT: f64 = 0.3;
+
+/// The weight of the line of a crease.
+fn crease_weight<S>(surface: &Surface<S>) -> f64 {
+    let sw = std::env::var("SEAMW")
+        .ok()
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(SEAM_WEIGHT);
+    if surface.curves.may_shift() {
+        sw
+    } else {
+        BOUNDARY_WEIGHT
+    }
+}
+
 /// Squared edge length enters with this weight, so that ties in flat regions go to short edges.
 const TIE_BREAK: f64 = 1e-12;
 
@@ -217,6 +233,7 @@ impl Least<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decimate::curves::Curves;
     use crate::decimate::geometry::{Geometry, Room};
 
     /// A surface of nothing but a shape.
@@ -234,7 +251,7 @@ mod tests {
             locked: Vec::new(),
             double_sided: Vec::new(),
             turned: Vec::new(),
-            creases: Vec::new(),
+            curves: Curves::default(),
             weights: Vec::new(),
             wedges: Default::default(),
             seam: Vec::new(),

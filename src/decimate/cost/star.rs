@@ -1,7 +1,7 @@
 //! The planes, folds and lines around vertices, four fans at a time.
 
 use super::form::{LANES, Lanes, Number, Vector, cross, dot, scaled};
-use super::{BOUNDARY_WEIGHT, LINE_WEIGHT, between, each, places, singular_weight};
+use super::{LINE_WEIGHT, between, crease_weight, each, places, singular_weight};
 use crate::decimate::surface::Surface;
 use crate::decimate::symmetric::Symmetric;
 use crate::mesh::{EdgeId, EdgeStore, Outgoing, VertexId};
@@ -94,7 +94,7 @@ impl Star {
     ) {
         let mesh = &surface.mesh;
         let is_open = mesh.mate(start).is_none();
-        if !is_open && surface.creases.is_empty() {
+        if !is_open && !surface.curves.are_kept() {
             return;
         }
         let mut lines = Symmetric::default();
@@ -109,10 +109,11 @@ impl Star {
                 add(e, singular_weight(mesh, e, boundary_weight));
             }
         }
-        if !surface.creases.is_empty() {
+        if surface.curves.are_kept() {
+            let weight = crease_weight(surface);
             for e in mesh.fan(start) {
                 let is_crease = mesh.mate(e).is_some() && surface.is_crease(e);
-                add(e, is_crease.then_some(BOUNDARY_WEIGHT));
+                add(e, is_crease.then_some(weight));
             }
         }
         for (number, line) in self.numbers.iter_mut().zip(lines.0) {
@@ -248,6 +249,7 @@ mod tests {
 
     use super::super::tests::surface;
     use super::*;
+    use crate::decimate::cost::BOUNDARY_WEIGHT;
     use crate::mesh::Full;
     use crate::shapes;
 

@@ -457,7 +457,7 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
             Opposite::NonManifold(_) => return false,
         };
         // Nothing here measures how far a crease, or a boundary that is free, strays.
-        if !self.surface.creases.is_empty() && self.surface.curves_at(v) > 0 {
+        if self.surface.curves.touch(v) {
             return false;
         }
         if !star.is_closed && self.piece.boundary.is_empty() {
