@@ -117,8 +117,10 @@ pub(super) const LINE_WEIGHT: f64 = 2.25;
 /// error 2 to 6 times smaller for 0 to 4 % of surface rms.
 pub(super) const BOUNDARY_WEIGHT: f64 = 8.0;
 
-/// The weight of a crease that may shift sideways.
-const SEAM_WEIGHT: f64 = 0.3;
+/// The weight of a crease that may shift sideways: on the surface, that is, where the planes do not
+/// care. 8 costs 13, 34 and 120 % of rms on a textured cow at 50, 10 and 2 %, 1 costs 9, 20 and 80 %,
+/// this 6, 7 and 50 %, a tenth of it 4, 6 and 50 %.
+const SEAM_WEIGHT: f64 = 0.1;
 
 /// The weight of the line of a crease.
 fn crease_weight<S>(surface: &Surface<S>) -> f64 {
@@ -127,7 +129,7 @@ fn crease_weight<S>(surface: &Surface<S>) -> f64 {
         .and_then(|s| s.parse().ok())
         .unwrap_or(SEAM_WEIGHT);
     if surface.curves.may_shift() {
-        sw
+        SEAM_WEIGHT
     } else {
         BOUNDARY_WEIGHT
     }
