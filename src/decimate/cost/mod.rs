@@ -124,10 +124,6 @@ const SEAM_WEIGHT: f64 = 0.1;
 
 /// The weight of the line of a crease.
 fn crease_weight<S>(surface: &Surface<S>) -> f64 {
-    let sw = std::env::var("SEAMW")
-        .ok()
-        .and_then(|s| s.parse().ok())
-        .unwrap_or(SEAM_WEIGHT);
     if surface.curves.may_shift() {
         SEAM_WEIGHT
     } else {
