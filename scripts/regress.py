@@ -205,6 +205,8 @@ def judge(case, outputs, options):
                     "triangle_quality_mean", "sliver_share", "new_boundary_edges", "new_non_manifold_edges",
                     "new_non_manifold_vertices"):
             output[key] = result[key]
+        output["inconsistent_edges"] = result["mesh"]["inconsistent_edges"]
+        case["found_in"] = result["reference"]
 
 
 def recorded_outputs(case, outputs, records):
@@ -213,7 +215,8 @@ def recorded_outputs(case, outputs, records):
     return [{"tool": f"{r['tool']} (recorded)", "error": None, "file": None, "triangles": int(r["triangles"]),
              "rms_of_diagonal": float(r["rms_of_diagonal"]), "mean_of_diagonal": float(r["mean_of_diagonal"]),
              "hausdorff_of_diagonal": float(r["hausdorff_of_diagonal"]),
-             "triangle_quality_mean": float(r["mean_triangle_quality"])}
+             "triangle_quality_mean": float(r["mean_triangle_quality"]),
+             "boundary_edges": int(r["boundary_edges"]), "non_manifold_edges": int(r["non_manifold_edges"])}
             for r in records if r["mesh"] == case["name"] and float(r["ratio_kept"]) == case["ratio"]
             and RECORDED_AS.get(r["tool"]) not in here]
 
@@ -283,6 +286,23 @@ def print_means(cases, ours):
                     ratios.append(mine[0] / min(others))
             cells.append(f"{geometric_mean(ratios):.2f}, {max(ratios):.2f}" if ratios else "–")
         print(f"| {tool} | " + " | ".join(cells) + " |")
+
+
+def print_harm(cases):
+    """Per tool, on closed manifold inputs whose faces agree, the runs whose output is not so."""
+    kinds = ["non_manifold_edges", "boundary_edges", "inconsistent_edges"]
+    clean = [case for case in cases if (found := case.get("found_in")) and found["is_orientable"] and not any(
+        found[key] for key in ("boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges"))]
+    print(f"\n**Runs that harm a clean mesh**, {len(clean)} cases; most edges of the kind in a run in brackets\n\n"
+          "| tool | runs | non-manifold edges | boundary edges | faces against their neighbours |\n|---|--:|--:|--:|--:|")
+    for tool in dict.fromkeys(o["tool"] for case in clean for o in case["outputs"]):
+        outputs = [o for case in clean for o in case["outputs"] if o["tool"] == tool and not o["error"]]
+        cells = []
+        for kind in kinds:
+            counts = [o[kind] for o in outputs if kind in o]
+            harmed = [count for count in counts if count]
+            cells.append("–" if not counts else f"{len(harmed)} ({max(harmed)})" if harmed else "0")
+        print(f"| {tool} | {len(outputs)} | " + " | ".join(cells) + " |")
 
 
 def print_recorded(cases, records):
@@ -462,6 +482,7 @@ def main():
                 (folder / name).unlink()
         if cases:
             print_means(cases, [o.tool for o in ours])
+            print_harm(cases)
         if records:
             print_recorded(cases, records)
         if options.csv:

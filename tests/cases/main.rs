@@ -1,6 +1,7 @@
 //! Cases with an answer that is known beforehand: those that other tools test themselves with
 //! ([`peers`]), and runs whose results must agree ([`metamorphic`]).
 
+mod any_triangles;
 mod metamorphic;
 mod peers;
 #[allow(dead_code, reason = "the library's own tests use the others")]
