@@ -161,6 +161,8 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
     io::check_place(output)?;
     let read_options = ReadOptions {
         format: args.input_format,
+        // Elsewhere vertices would stand once for each of their wedges, as if they were cut.
+        attributes: output_format == Format::Obj,
         ..ReadOptions::default()
     };
     let mesh = io::read(input, &read_options)?;

@@ -985,7 +985,7 @@ fn a_vertex_weight_is_read_from_a_property() {
     for (input, output) in [
         ("line.ply --vertex-weight kept", "line_out.ply"),
         ("even.ply --vertex-weight kept", "even_out.ply"),
-        ("line.ply", "plain_out.ply"),
+        ("hill.ply", "plain_out.ply"),
     ] {
         let ran = folder.run(&format!("{input} -o {output} --triangles 100"));
         assert_eq!(ran.status, 0, "{}", ran.stderr);

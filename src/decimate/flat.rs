@@ -149,8 +149,7 @@ impl<V> Flat<V> {
 
     /// The surface of these arrays over a mesh built from their triangles, and the states.
     ///
-    /// `room` is the one of the whole. `turned` says which faces were turned round for the mesh. A
-    /// turned face must have no crease.
+    /// `room` is the one of the whole. `turned` says which faces were turned round for the mesh.
     pub fn into_surface<S: EdgeStore>(
         self,
         mesh: Mesh<S>,
@@ -163,7 +162,12 @@ impl<V> Flat<V> {
             *was ^= now;
         }
         let [a, b, c] = [0, 1, 2].map(|k| FaceFlags::CREASE << k);
-        let creases = self.unpacked(faces, &[a, b, c], self.creased);
+        let mut creases = self.unpacked(faces, &[a, b, c], self.creased);
+        // Turned round, a face has its edges the other way round behind its first corner, too.
+        let edges = creases.chunks_exact_mut(3).zip(turned);
+        edges
+            .filter(|(_, turned)| **turned)
+            .for_each(|(edges, _)| edges.swap(0, 2));
         let double_sided = self.unpacked(faces, &[FaceFlags::DOUBLE_SIDED], false);
         let mut deviation = self.deviation;
         deviation.resize(mesh.vertex_slots(), 0.0);

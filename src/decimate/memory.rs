@@ -1,8 +1,10 @@
 //! How much memory there is, how much a tier needs, and so which to take.
 
 use super::chunked::{Sizes, left_by_chunks};
-use super::options::{Options, Quality, TierChoice};
+use super::options::{AttributeUse, Options, Quality, TierChoice};
+use crate::attributes::Channel;
 use crate::error::{Error, Result};
+use crate::indexed_mesh::IndexedMesh;
 use crate::mesh::Tier;
 
 /// What fitting takes a triangle of the original: 18 for its arrays, 36 to sort it into cells, and as
@@ -85,22 +87,52 @@ fn bytes_in_chunks(
 /// (`data/results/figure7.md`).
 const BY_SPEED: [Tier; 3] = [Tier::Small, Tier::Medium, Tier::Full];
 
-/// The tier to use, and why.
-pub(super) fn choose_tier(
-    options: &Options,
+/// What there is to decimate.
+pub(super) struct Load {
     vertices: usize,
     triangles: usize,
-    target: usize,
-) -> Result<(Tier, String)> {
+    /// The most bytes that attributes take meanwhile, beside all else.
+    carried_bytes: u64,
+}
+
+impl Load {
+    /// The load that a mesh is.
+    pub fn of(mesh: &IndexedMesh, options: &Options) -> Self {
+        let attributes = mesh.attributes();
+        let numbers: usize = attributes.channels.iter().map(Channel::width).sum();
+        let words = 3 * attributes.corners.len() + attributes.group_of.len();
+        let words = match options.attributes {
+            AttributeUse::Ignore => 0,
+            AttributeUse::Carry => words + attributes.wedge_count() * numbers,
+            AttributeUse::Optimize => words + attributes.wedge_count() * (4 * numbers + 7),
+        };
+        Self {
+            vertices: mesh.positions().len(),
+            triangles: mesh.triangles().len(),
+            carried_bytes: 4 * words as u64,
+        }
+    }
+}
+
+/// The tier to use, and why.
+pub(super) fn choose_tier(options: &Options, load: &Load, target: usize) -> Result<(Tier, String)> {
+    let &Load {
+        vertices,
+        triangles,
+        carried_bytes,
+    } = load;
     let tier = match options.tier {
         TierChoice::Fixed(tier) => Some(tier),
         TierChoice::Auto => None,
     };
     let left = left_by_chunks(triangles, target);
     let chunks = Sizes::of(options.chunks, triangles, triangles, left);
-    let needed = |tier| match &chunks {
-        Some(sizes) => bytes_in_chunks(sizes, options.quality, tier, vertices, triangles),
-        None => needed_bytes(options.quality, tier, vertices, triangles),
+    let needed = |tier| {
+        carried_bytes
+            + match &chunks {
+                Some(sizes) => bytes_in_chunks(sizes, options.quality, tier, vertices, triangles),
+                None => needed_bytes(options.quality, tier, vertices, triangles),
+            }
     };
     if let (Some(tier), None) = (tier, options.memory_limit_bytes) {
         return Ok((tier, "asked for".into()));
@@ -150,7 +182,12 @@ mod tests {
             memory_limit_bytes: Some(limit),
             ..Options::default()
         };
-        choose_tier(&options, 500_000, 1_000_000, 1_000_000).map(|(tier, _)| tier)
+        let load = Load {
+            vertices: 500_000,
+            triangles: 1_000_000,
+            carried_bytes: 0,
+        };
+        choose_tier(&options, &load, 1_000_000).map(|(tier, _)| tier)
     }
 
     /// A million triangles: the fastest tier takes the least, too, so that it is taken down to its need

@@ -42,6 +42,7 @@ use fit::{Arrays, Terms, fit_to_original};
 use flat::Flat;
 use geometry::Room;
 use greedy::{Greedy, Stop};
+use memory::Load;
 use surface::Surface;
 use wedges::FlatWedges;
 
@@ -65,8 +66,8 @@ pub fn decimate(mesh: IndexedMesh, options: &Options) -> Result<(IndexedMesh, Re
 /// [`decimate`], telling `progress` how far it is; breaking cancels it.
 ///
 /// It is called on this thread: where each [stage](Stage) begins, after about every 65 000 triangles
-/// that a thread has visited or 3000 that it has removed (0.1 s at the most, on a mesh of a million
-/// triangles), and once when all is done. The result does not depend on it.
+/// that a thread has visited or 3000 that it has removed (a tenth of a second of work, about), and
+/// once when all is done. The result does not depend on it.
 ///
 /// ```
 /// use std::ops::ControlFlow;
@@ -121,8 +122,9 @@ fn decimate_for(
     if mesh.triangles().is_empty() {
         return Err(no_triangle_left(triangles_in, &cleaning));
     }
-    let (vertices, faces) = (mesh.positions().len(), mesh.triangles().len());
-    let (tier, tier_reason) = memory::choose_tier(options, vertices, faces, target_triangles)?;
+    let vertices = mesh.positions().len();
+    let (tier, tier_reason) =
+        memory::choose_tier(options, &Load::of(&mesh, options), target_triangles)?;
     let mut report = Report {
         vertices_in,
         triangles_in,

@@ -1211,7 +1211,8 @@ fn a_busy_vertex_takes_no_quadratic_time() {
         feature_angle_degrees: Some(20.0),
         ..to_triangles(50_000)
     };
-    assert_eq!(down(cone(0.01, 0.5), creased).triangles_out, 50_000);
+    // Where spokes are sharp, they stay.
+    assert!(down(cone(0.01, 0.5), creased).triangles_out < 90_000);
     let simplified = Options {
         topology: Topology::Simplify,
         ..to_triangles_in(Quality::Fast, 50_000)

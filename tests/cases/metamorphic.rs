@@ -216,9 +216,9 @@ fn tiers_and_threads_give_the_same_bytes() {
 }
 
 /// Components side by side, so long that one alone has the scale of all: what an error leaves of each
-/// does not depend on the others, to the bit. (Not so with the best quality, whose fit moves no vertex
-/// further than half the mean edge of all, and ends for all at once; nor in chunks, which are cut and
-/// whose threshold is found for the whole.)
+/// does not depend on the others, to the bit. (Not so with the best quality, whose fit samples the
+/// whole and goes piece by piece of it; nor in chunks, which are cut and whose threshold is found for
+/// the whole.)
 #[test]
 fn each_component_alone_is_as_in_the_whole() {
     let (sheet, squares) = bumpy(20);

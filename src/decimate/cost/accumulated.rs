@@ -8,7 +8,7 @@ use super::attributes::{AttributeForms, carried};
 use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, crease_weight,
-    doubles, each, part, places, singular_weight,
+    doubles, each, list_touched, part, places, singular_weight,
 };
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
@@ -267,11 +267,8 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         self.quadrics[kept.index()] = Quadric::new(a.plus(a2), b + b2, (c + c2).max(0.0));
         changed.clear();
         if let Some(attributes) = &mut self.attributes {
-            changed.push(kept);
-            changed.extend(surface.mesh.neighbours(kept));
-            changed.extend(&merged.around);
-            changed.sort_unstable();
-            changed.dedup();
+            list_touched(&surface.mesh, merged, changed);
+            changed.retain(|&x| !surface.mesh.is_busy(x));
             attributes.update(surface, changed);
             changed.clear();
         }

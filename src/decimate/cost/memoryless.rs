@@ -10,7 +10,9 @@ use rayon::prelude::*;
 use super::attributes::{AttributeForms, carried};
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
-use super::{Cost, Evaluation, LANES, between, boundary_weight, doubles, each, part, places};
+use super::{
+    Cost, Evaluation, LANES, between, boundary_weight, doubles, each, list_touched, part, places,
+};
 use crate::decimate::options::{Options, Placement};
 use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
@@ -319,24 +321,8 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         changed: &mut Vec<VertexId>,
     ) {
         let kept = merged.collapse.kept;
-        changed.clear();
-        changed.push(kept);
+        list_touched(&surface.mesh, merged, changed);
         let gained = merged.gained.as_deref();
-        if let Some(gained) = gained {
-            let ends = gained.iter().flat_map(|&e| surface.mesh.edge_vertices(e));
-            changed.extend(ends.filter(|&x| x != kept));
-        } else {
-            changed.extend(surface.mesh.neighbours(kept));
-            changed.extend(&merged.around);
-        }
-        if gained.is_some()
-            || !merged.around.is_empty()
-            || surface.mesh.is_non_manifold_vertex(kept)
-        {
-            // A vertex where many fans end is met once for each, one around maybe twice.
-            changed[1..].sort_unstable();
-            changed.dedup();
-        }
         changed.retain(|&x| {
             let tensor = &mut self.tensors[x.index()];
             let lags = (x != kept || gained.is_some()) && tensor.left > 0;
