@@ -316,8 +316,10 @@ def picture(case, view, options):
         return f"{number(mesh.n_cells, None)} triangles"
 
     column(0, ["original", triangles(reference)], camera.image(reference))
+    ours = sum(is_ours(outputs[0]["tool"]) for _, outputs, *_ in measured)
     for k, (mesh, outputs, fine, error) in enumerate(measured, 1):
-        name = "decimate" if is_ours(outputs[0]["tool"]) else " = ".join(o["tool"] for o in outputs)
+        is_only = ours == 1 and is_ours(outputs[0]["tool"])
+        name = "decimate" if is_only else " = ".join(o["tool"] for o in outputs)
         column(k, [name, triangles(mesh), rms_text(outputs[0])], camera.image(mesh), camera.image(fine, error, top))
     # The scale stands under the original, which has no error.
     left, right, above = size, width - size, head + height + size + height // 3
