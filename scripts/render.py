@@ -88,15 +88,23 @@ def read_ply(data):
         # The usual file: three ids in every face.
         fields = []
         for p in properties:
-            fields += [("count of " + p[0], p[1], 1), (p[0], p[2], 3)] if len(p) == 3 else [(p[0], p[1], 1)]
+            size = 6 if p[0] == "texcoord" else 3
+            fields += [("count of " + p[0], p[1], 1), (p[0], p[2], size)] if len(p) == 3 else [(p[0], p[1], 1)]
         table = values.table(fields, rows) if name in ("vertex", "face") else None
-        if table is not None and all((table["count of " + p[0]] == 3).all() for p in properties if len(p) == 3):
+        if table is not None and all((table["count of " + p[0]] == table[p[0]].shape[1]).all()
+                                     for p in properties if len(p) == 3):
             values.at += table.nbytes
             if name == "vertex":
                 points = np.concatenate([table[c] for c in "xyz"], axis=1)
                 columns = {p[0]: table[p[0]][:, 0] for p in properties if p[0] not in tuple("xyz")}
             else:
                 triangles = next(table[p[0]] for p in properties if p[0] in ("vertex_indices", "vertex_index"))
+                if "texcoord" in table.dtype.names:
+                    # A vertex a corner: what the corners have becomes the vertices'.
+                    corners, texture = triangles.ravel(), table["texcoord"].reshape(-1, 2)
+                    points, triangles = points[corners], np.arange(len(corners)).reshape(-1, 3)
+                    columns = {name: column[corners] for name, column in columns.items()}
+                    columns |= {"s": texture[:, 0], "t": texture[:, 1]}
             continue
         for _ in range(rows):
             row = {}
