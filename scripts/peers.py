@@ -109,17 +109,23 @@ def measure(call):
     return result, seconds, (peak_bytes(is_reset) - before) / 1e6
 
 
-def write_ply(path, points, triangles):
-    """Binary, without the vertices that no triangle uses, in the precision of the points."""
+def write_ply(path, points, triangles, columns=None):
+    """Binary, without the vertices that no triangle uses, in the precision of the points; `columns` holds what else the
+    vertices have, by name, in single precision."""
     used, corners = np.unique(np.asarray(triangles, dtype=np.int64), return_inverse=True)
     points = np.asarray(points)[used]
     kind, word = ("<f8", "double") if points.dtype == np.float64 else ("<f4", "float")
+    fields = [(axis, kind, word, points[:, k]) for k, axis in enumerate("xyz")]
+    fields += [(name, "<f4", "float", np.asarray(column)[used]) for name, column in (columns or {}).items()]
+    vertices = np.empty(len(points), dtype=[(name, kind) for name, kind, *_ in fields])
+    for name, _, _, values in fields:
+        vertices[name] = values
     faces = np.empty(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, corners.reshape(-1, 3)
     header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-              + "".join(f"property {word} {axis}\n" for axis in "xyz")
+              + "".join(f"property {word} {name}\n" for name, _, word, _ in fields)
               + f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
-    pathlib.Path(path).write_bytes(header.encode() + points.astype(kind).tobytes() + faces.tobytes())
+    pathlib.Path(path).write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
 
 
 def main():

@@ -95,7 +95,7 @@ def load_ply(path):
 def arrays(decimate, mesh, folder):
     """Welds the mesh, writes its arrays for the peers; the welded file and the count of its triangles."""
     welded = folder / f"{mesh.stem}-welded.ply"
-    run(decimate, mesh, "-o", welded, "--ratio", "1", "--quiet")
+    run(decimate, mesh, "-o", welded, "--ratio", "1", "--attributes", "ignore", "--quiet")
     points, triangles = load_ply(welded)
     np.save(folder / "points.npy", points)
     np.save(folder / "triangles.npy", triangles)
@@ -173,6 +173,18 @@ def compare(options, reference, files):
     return json.loads(run(options.decimate, "compare", reference, *files, "--json", "--samples", options.samples))
 
 
+def numbers(result):
+    """What counts of what `decimate compare` says."""
+    distance = result["surface"]["two_sided_of_diagonal"]
+    keys = ("normal_deviation_mean_degrees", "normal_deviation_99th_percentile_degrees", "triangle_quality_mean",
+            "sliver_share", "new_boundary_edges", "new_non_manifold_edges", "new_non_manifold_vertices")
+    return {"triangles": result["mesh"]["triangles"], "rms_of_diagonal": distance["rms"],
+            "mean_of_diagonal": distance["mean"], "hausdorff_of_diagonal": distance["max"],
+            "boundary_edges": result["mesh"]["boundary_edges"],
+            "non_manifold_edges": result["mesh"]["non_manifold_edges"],
+            "inconsistent_edges": result["mesh"]["inconsistent_edges"], **{key: result[key] for key in keys}}
+
+
 def judge(case, outputs, options):
     """Adds what `decimate compare` says; files of the same bytes are compared once, in one call for all."""
     files = {}
@@ -196,16 +208,7 @@ def judge(case, outputs, options):
         if isinstance(result, str):
             output["error"] = result
             continue
-        distance = result["surface"]["two_sided_of_diagonal"]
-        output.update(triangles=result["mesh"]["triangles"], rms_of_diagonal=distance["rms"],
-                      mean_of_diagonal=distance["mean"], hausdorff_of_diagonal=distance["max"],
-                      boundary_edges=result["mesh"]["boundary_edges"],
-                      non_manifold_edges=result["mesh"]["non_manifold_edges"])
-        for key in ("normal_deviation_mean_degrees", "normal_deviation_99th_percentile_degrees",
-                    "triangle_quality_mean", "sliver_share", "new_boundary_edges", "new_non_manifold_edges",
-                    "new_non_manifold_vertices"):
-            output[key] = result[key]
-        output["inconsistent_edges"] = result["mesh"]["inconsistent_edges"]
+        output.update(numbers(result))
         case["found_in"] = result["reference"]
 
 

@@ -3,7 +3,8 @@
 
     render.py full.ply small.ply -o out.png --titles "100 %" "10 %" --edges
 
-Reads OBJ, OFF, PLY (text or binary, faces or triangle strips) and STL. Draws off screen, without display or GPU: VTK
+Reads OBJ, OFF, PLY (text or binary, faces or triangle strips) and STL; of PLY also the colours and texture coordinates
+that a vertex has, which --attributes shows: the texture as a checkerboard. Draws off screen, without display or GPU: VTK
 falls back to EGL after a warning about the X server. On a bare Debian or Ubuntu: `apt-get install libgl1 libegl1`;
 where EGL fails too, `apt-get install xvfb` and `xvfb-run -a` before the command.
 """
@@ -17,6 +18,9 @@ import pyvista
 from PIL import Image
 
 MAX_TRIANGLES_WITH_EDGES = 30_000  # in a view 500 pixels wide more are one dark surface
+COLOR = ("red", "green", "blue")
+TEXTURE = [("s", "t"), ("u", "v"), ("texture_u", "texture_v")]
+CHECKERBOARD_SQUARES = 24
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
          "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
          "float32": "f4", "float64": "f8"}
@@ -79,19 +83,28 @@ def read_ply(data):
         elif words[:1] == ["property"]:
             elements[-1][2].append((words[-1], *(TYPES[w] for w in words[1:-1] if w != "list")))
     values = BinaryValues(body, order) if order else TextValues(body)
-    points, triangles = [], []
+    points, triangles, columns = [], [], {}
     for name, rows, properties in elements:
         # The usual file: three ids in every face.
         fields = []
         for p in properties:
-            fields += [("count of " + p[0], p[1], 1), (p[0], p[2], 3)] if len(p) == 3 else [(p[0], p[1], 1)]
+            size = 6 if p[0] == "texcoord" else 3
+            fields += [("count of " + p[0], p[1], 1), (p[0], p[2], size)] if len(p) == 3 else [(p[0], p[1], 1)]
         table = values.table(fields, rows) if name in ("vertex", "face") else None
-        if table is not None and all((table["count of " + p[0]] == 3).all() for p in properties if len(p) == 3):
+        if table is not None and all((table["count of " + p[0]] == table[p[0]].shape[1]).all()
+                                     for p in properties if len(p) == 3):
             values.at += table.nbytes
             if name == "vertex":
                 points = np.concatenate([table[c] for c in "xyz"], axis=1)
+                columns = {p[0]: table[p[0]][:, 0] for p in properties if p[0] not in tuple("xyz")}
             else:
                 triangles = next(table[p[0]] for p in properties if p[0] in ("vertex_indices", "vertex_index"))
+                if "texcoord" in table.dtype.names:
+                    # A vertex a corner: what the corners have becomes the vertices'.
+                    corners, texture = triangles.ravel(), table["texcoord"].reshape(-1, 2)
+                    points, triangles = points[corners], np.arange(len(corners)).reshape(-1, 3)
+                    columns = {name: column[corners] for name, column in columns.items()}
+                    columns |= {"s": texture[:, 0], "t": texture[:, 1]}
             continue
         for _ in range(rows):
             row = {}
@@ -102,7 +115,7 @@ def read_ply(data):
             elif name in ("face", "tristrips"):
                 ids = row["vertex_indices"] if "vertex_indices" in row else row["vertex_index"]
                 triangles += fan(ids) if name == "face" else strip(ids)
-    return points, triangles
+    return points, triangles, columns
 
 
 def read_obj(data):
@@ -113,7 +126,7 @@ def read_obj(data):
         elif words[:1] == ["f"]:
             ids = [int(w.split("/")[0]) for w in words[1:] if w[0] != "#"]
             triangles += fan([v - 1 if v > 0 else len(points) + v for v in ids])
-    return points, triangles
+    return points, triangles, {}
 
 
 def read_off(data):
@@ -125,7 +138,7 @@ def read_off(data):
         count = int(words[at])
         triangles += fan([int(w) for w in words[at + 1:at + 1 + count]])
         at += 1 + count  # files with colours behind the ids are not read
-    return points, triangles
+    return points, triangles, {}
 
 
 def read_stl(data):
@@ -136,7 +149,7 @@ def read_stl(data):
     else:
         lines = (line.split() for line in data.decode("latin-1").splitlines())
         points = np.array([w[1:4] for w in lines if w[:1] == ["vertex"]], dtype=float)
-    return points, np.arange(len(points)).reshape(-1, 3)
+    return points, np.arange(len(points)).reshape(-1, 3), {}
 
 
 READERS = {".ply": read_ply, ".obj": read_obj, ".off": read_off, ".stl": read_stl}
@@ -146,10 +159,42 @@ def read(path):
     suffix = path.suffix.lower()
     if suffix not in READERS:
         sys.exit(f"{path}: unknown suffix, expected one of {' '.join(READERS)}")
-    points, triangles = READERS[suffix](path.read_bytes())
+    points, triangles, columns = READERS[suffix](path.read_bytes())
     if len(triangles) == 0:
         sys.exit(f"{path}: no triangles")
-    return pyvista.PolyData.from_regular_faces(np.array(points, dtype=np.float32), np.array(triangles, dtype=np.int64))
+    mesh = pyvista.PolyData.from_regular_faces(np.array(points, dtype=np.float32), np.array(triangles, dtype=np.int64))
+    if set(COLOR) <= columns.keys():
+        color = np.stack([columns[c] for c in COLOR], axis=1)
+        # Whole numbers are of 8 or 16 bits, others from 0 to 1.
+        top = np.iinfo(color.dtype).max if color.dtype.kind in "iu" else 1.0
+        mesh.point_data["color"] = np.clip(np.rint(color / top * 255.0), 0, 255).astype(np.uint8)
+    for pair in TEXTURE:
+        if set(pair) <= columns.keys():
+            mesh.active_texture_coordinates = np.stack([columns[c] for c in pair], axis=1).astype(np.float32)
+            break
+    return mesh
+
+
+def checkerboard(squares=CHECKERBOARD_SQUARES, pixels=64):
+    """Grey and a colour that goes round with u, darker with v: a square out of its place is seen."""
+    at = (np.arange(squares * pixels) // pixels) / squares
+    u, v = np.meshgrid(at, at)
+    turn = 2 * np.pi * (u[..., None] + np.array([0, 1, 2]) / 3)
+    color = (0.6 + 0.35 * np.cos(turn)) * (1 - 0.45 * v[..., None])
+    is_grey = (np.rint(u * squares) + np.rint(v * squares)) % 2 == 0
+    # The first row of a texture is its top.
+    return np.flipud(np.where(is_grey[..., None], 0.88, color) * 255).astype(np.uint8)
+
+
+def look(mesh):
+    """What shows the attributes of a mesh to pyvista's add_mesh; nothing where there are none."""
+    if mesh.active_texture_coordinates is not None:
+        texture = pyvista.numpy_to_texture(np.ascontiguousarray(checkerboard()))
+        texture.repeat, texture.interpolate = True, True
+        return {"texture": texture}
+    if "color" in mesh.point_data:
+        return {"scalars": "color", "rgb": True, "show_scalar_bar": False}
+    return {}
 
 
 def main():
@@ -166,6 +211,7 @@ def main():
     parser.add_argument("--up", nargs=3, type=float, default=(0.0, 0.0, 1.0), metavar=("X", "Y", "Z"))
     parser.add_argument("--zoom", type=float, default=1.0)
     parser.add_argument("--color", default="#dcc8a4")
+    parser.add_argument("--attributes", action="store_true", help="show colours and textures where a PLY has them")
     options = parser.parse_args()
     if options.titles and len(options.titles) != len(options.meshes):
         parser.error("as many titles as meshes, please")
@@ -185,7 +231,8 @@ def main():
         plotter.subplot(k // columns, k % columns)
         plotter.set_background("white")
         edges = options.edges and mesh.n_cells <= MAX_TRIANGLES_WITH_EDGES
-        plotter.add_mesh(mesh, color=options.color, smooth_shading=False, show_edges=edges,
+        shown = look(mesh) if options.attributes else {}
+        plotter.add_mesh(mesh, **(shown or {"color": options.color}), smooth_shading=False, show_edges=edges,
                          edge_color="#4a4036", edge_opacity=0.6, line_width=0.6, ambient=0.12, diffuse=1.0, specular=0.0)
         plotter.add_text(title, position="lower_edge", font_size=11, color="#333333")
         camera = plotter.camera

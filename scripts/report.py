@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Make one self-contained HTML page of what regress.py found: pictures, error as colour, tables, plots.
+"""Make one self-contained HTML page of what regress.py or attributes.py found: pictures, error as colour, tables, plots.
 
     report.py results.json -o report.html
     report.py results.json --picture nefertiti 0.02 -o compared.png     one case's pictures alone
 
-For each mesh: the original and each tool's output (flat shaded, one camera), under each output its distance to the
+For each mesh: the original and each tool's output (flat shaded, one camera; with its colours, or a checkerboard where it
+has texture coordinates, if the file has a vertex for each wedge), under each output its distance to the
 reference as colour (one scale for all tools at one ratio), the table, and rms and Hausdorff against triangles kept.
 Tools that wrote the same bytes share one picture, and one line in the plots where they did so at every ratio. Needs no
 display; where VTK finds neither EGL nor an X server, see render.py.
@@ -45,8 +46,15 @@ COLUMNS = [
     ("triangle_quality_mean", "quality", 1, 3, False, False),
     ("new_boundary_edges", "new boundary edges", 1, None, True, False),
     ("new_non_manifold_edges", "new non-manifold edges", 1, None, True, False),
+    ("normal_rms_degrees", "normals carried, °", 1, 3, True, True),
+    ("texture_coordinate_rms_texture_units", "texture, 10⁻³", 1e3, 3, True, True),
+    ("texture_coordinate_mean_texture_units", "its mean, 10⁻³", 1e3, 3, True, True),
+    ("color_rms_of_full_range", "colour, 10⁻³ of full range", 1e3, 3, True, True),
+    ("triangles_turned_against_reference", "turned in texture", 1, None, True, False),
+    ("lost_attributes", "attributes lost", 1, None, True, False),
 ]
-SUMMARY = ["rms_of_diagonal", "mean_of_diagonal", "hausdorff_of_diagonal", "normal_deviation_mean_degrees", "seconds",
+SUMMARY = ["rms_of_diagonal", "mean_of_diagonal", "hausdorff_of_diagonal", "normal_deviation_mean_degrees",
+           "normal_rms_degrees", "texture_coordinate_rms_texture_units", "color_rms_of_full_range", "seconds",
            "megabytes"]
 EXTRA_TRIANGLES = 1.02  # above this multiple of the target an error is not compared with the others'
 EXACT = 1e-9  # of the diagonal; a smaller error is none, and has no logarithm
@@ -133,7 +141,10 @@ class Camera:
                                   window_size=[SUPERSAMPLES * side for side in self.size])
         plotter.set_background("white")
         if scalars is None:
-            plotter.add_mesh(mesh, color=SURFACE, ambient=0.12, diffuse=1.0, specular=0.0)
+            # What the mesh carries, if anything, shows better with less shade.
+            shown = render.look(mesh)
+            plotter.add_mesh(mesh, **(shown or {"color": SURFACE}), ambient=0.35 if shown else 0.12,
+                             diffuse=0.7 if shown else 1.0, specular=0.0)
         else:
             plotter.add_mesh(mesh, scalars=scalars, cmap=COLORS, clim=(0, top), above_color=ABOVE,
                              show_scalar_bar=False, interpolate_before_map=True, ambient=0.55, diffuse=0.5,
@@ -168,7 +179,9 @@ def ruler(path):
 
 def distances(mesh, distance, diagonal, samples):
     """The mesh, cut finer so that the error inside of large faces shows, and the distance at each of its points."""
-    fine = mesh.clean(tolerance=0.0).triangulate()
+    fine = mesh.copy()
+    fine.clear_data()
+    fine = fine.clean(tolerance=0.0).triangulate()
     # Double precision, as rounding would turn the normals of the small triangles, and of size 1 around 0, as VTK's
     # subdivision tears holes where coordinates are in the hundreds.
     centre = np.array(fine.center)
@@ -303,8 +316,10 @@ def picture(case, view, options):
         return f"{number(mesh.n_cells, None)} triangles"
 
     column(0, ["original", triangles(reference)], camera.image(reference))
+    ours = sum(is_ours(outputs[0]["tool"]) for _, outputs, *_ in measured)
     for k, (mesh, outputs, fine, error) in enumerate(measured, 1):
-        name = "decimate" if is_ours(outputs[0]["tool"]) else " = ".join(o["tool"] for o in outputs)
+        is_only = ours == 1 and is_ours(outputs[0]["tool"])
+        name = "decimate" if is_only else " = ".join(o["tool"] for o in outputs)
         column(k, [name, triangles(mesh), rms_text(outputs[0])], camera.image(mesh), camera.image(fine, error, top))
     # The scale stands under the original, which has no error.
     left, right, above = size, width - size, head + height + size + height // 3
@@ -427,7 +442,7 @@ def prepare(cases):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("results", type=pathlib.Path, metavar="RESULTS.json", help="written by regress.py")
+    parser.add_argument("results", type=pathlib.Path, metavar="RESULTS.json", help="written by regress.py or attributes.py")
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True, metavar="OUT")
     parser.add_argument("--picture", nargs=2, metavar=("MESH", "RATIO"),
                         help="instead of the page a PNG of this case, the mesh by its name without suffix")
@@ -480,7 +495,9 @@ def main():
 <p>Rms, mean and Hausdorff are distances between output and original, both ways, measured by
 <code>decimate compare</code>, in 10⁻⁴ of the diagonal of the original's bounding box. Normals: mean deviation.
 Quality: 4√3 · area over the sum of the squared edges, 1 for equilateral triangles. Seconds and MB: the tool's call
-alone, and the growth of its memory. <b>Bold</b>: the best. The colours show one way only, from the output to the
+alone, and the growth of its memory. Normals carried, texture and colour: rms of the difference between a sample's value
+and that at the nearest point, both ways. Turned in texture: triangles that run the other way round there than the
+original's. <b>Bold</b>: the best. The colours show one way only, from the output to the
 original: a part that got lost has none.</p>
 {summary([case for cases in groups.values() for case in cases])}
 {''.join(sections)}

@@ -119,6 +119,10 @@ pub struct CompareArgs {
     /// Count pairs of triangles that cut each other, too.
     #[arg(long)]
     pub intersections: bool,
+    /// Compare normals, colours, texture coordinates and scalars at nearest points, too, and count the
+    /// triangles that are turned over in the texture.
+    #[arg(long)]
+    pub attributes: bool,
     /// Print JSON: a list with an object for each mesh.
     #[arg(long)]
     pub json: bool,

@@ -184,7 +184,7 @@ fn show_comparison(args: &CompareArgs) -> Result<ExitCode, Error> {
     use_threads(args.threads)?;
     let name = |error| name_mesh(error, &args.reference);
     let read_options = ReadOptions {
-        attributes: false,
+        attributes: args.attributes,
         ..ReadOptions::default()
     };
     let read = |path| io::read(path, &read_options);

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use decimate::decimate::{Report, StopReason};
-use decimate::metrics::{Comparison, Info, TwoSided};
+use decimate::metrics::{
+    AttributeComparison, ChannelComparison, Comparison, Info, TextureComparison, TwoSided, Unit,
+};
 use decimate::repair::CutReport;
 use decimate::structures::{Cost, Measured, Query, Row};
 use serde::Serialize;
@@ -264,6 +266,7 @@ pub fn comparison(compared: &[Compared]) -> String {
     row("intersecting pairs", &|c| {
         c.intersecting_pairs.map_or("-".into(), |n| n.to_string())
     });
+    attribute_rows(compared, &mut row);
     let names = compared
         .iter()
         .map(|c| format!(" {:>width$}", file_name(c)));
@@ -271,6 +274,87 @@ pub fn comparison(compared: &[Compared]) -> String {
     let first_row = text.find('\n').map_or(0, |end| end + 1);
     text.insert_str(first_row, &header);
     text
+}
+
+/// Adds a row: its name, and what stands in a mesh's column.
+type AddRow<'a> = &'a mut dyn FnMut(&str, &dyn Fn(&Comparison) -> String);
+
+/// The rows of the attributes that one of the meshes shares with the reference, in the order in which
+/// they are met, and of those that have no partner.
+fn attribute_rows(compared: &[Compared], row: AddRow) {
+    let all = |c: &Comparison| c.attributes.clone();
+    let comparisons: Vec<AttributeComparison> =
+        compared.iter().filter_map(|c| all(&c.comparison)).collect();
+    if comparisons.is_empty() {
+        return;
+    }
+    let mut channels: Vec<&ChannelComparison> = Vec::new();
+    for channel in comparisons.iter().flat_map(|c| &c.channels) {
+        if !channels.iter().any(|c| c.name == channel.name) {
+            channels.push(channel);
+        }
+    }
+    for ChannelComparison {
+        name,
+        unit,
+        texture,
+        ..
+    } in channels
+    {
+        let unit = match unit {
+            Unit::Degrees => "degrees",
+            Unit::TextureUnits => "texture units",
+            Unit::OfFullRange => "of full range",
+            _ => "its own units",
+        };
+        let cell = |of: &dyn Fn(&ChannelComparison) -> Option<String>, c: &Comparison| {
+            let channels = c.attributes.iter().flat_map(|a| &a.channels);
+            let found = channels.filter(|c| c.name == *name).find_map(of);
+            found.unwrap_or("-".into())
+        };
+        let mut difference = |label: &str, of: fn(&ChannelComparison) -> f64| {
+            row(label, &|c| {
+                cell(&|channel| Some(format!("{:.4e}", of(channel))), c)
+            });
+        };
+        difference(&format!("{name} ({unit}), rms"), |c| c.two_sided.rms);
+        difference("  from reference", |c| c.from_reference.rms);
+        difference("  from mesh", |c| c.from_mesh.rms);
+        difference("  mean", |c| c.two_sided.mean);
+        difference("  largest", |c| c.two_sided.max);
+        if texture.is_some() {
+            let mut count = |label: &str, of: fn(&TextureComparison) -> usize| {
+                row(label, &|c| {
+                    cell(
+                        &|channel| channel.texture.as_ref().map(|t| of(t).to_string()),
+                        c,
+                    )
+                });
+            };
+            count("  charts", |t| t.mesh_charts);
+            count("  flipped chart triangles", |t| {
+                t.mesh_flipped_chart_triangles
+            });
+            count("  turned against the reference", |t| {
+                t.triangles_turned_against_reference
+            });
+        }
+    }
+    let names = |names: &[String]| match names {
+        [] => "none".into(),
+        names => names.join(", "),
+    };
+    let mut only = |label: &str, of: fn(&AttributeComparison) -> &[String]| {
+        if comparisons.iter().any(|c| !of(c).is_empty()) {
+            row(label, &|c| {
+                c.attributes.as_ref().map_or("-".into(), |a| names(of(a)))
+            });
+        }
+    };
+    only("attributes of the reference alone", |c| {
+        &c.only_in_reference
+    });
+    only("attributes of the mesh alone", |c| &c.only_in_mesh);
 }
 
 /// The structures as two tables, a row each: the paper's Table 1 with what was measured beside it,

@@ -405,6 +405,40 @@ fn compare_measures_each_mesh_against_the_reference() {
         .failed(2, "samples");
 }
 
+/// A square that is white and one of four fifths of it: a fifth of the full range apart, where asked for.
+#[test]
+fn compare_measures_attributes_where_asked() {
+    let folder = Folder::with(&[]);
+    for (name, shade) in [("white.ply", 255), ("grey.ply", 204)] {
+        let corners = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
+        let vertices = corners
+            .map(|p| format!("{p} {shade} {shade} {shade}\n"))
+            .concat();
+        let colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+        let ply = format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+             property float z\n{colors}element face 2\n\
+             property list uchar int vertex_indices\nend_header\n{vertices}3 0 1 2\n3 0 2 3\n"
+        );
+        folder.write(name, &ply);
+    }
+    let compare = "compare white.ply grey.ply --samples 1000";
+    let json = |ran: Ran| -> Value { serde_json::from_slice(&ran.stdout).unwrap() };
+    let found = json(folder.run(&format!("{compare} --attributes --json")));
+    let color = &found[0]["attributes"]["channels"][0];
+    assert_eq!(
+        (&color["name"], &color["unit"]),
+        (&"color".into(), &"of_full_range".into())
+    );
+    let rms = color["two_sided"]["rms"].as_f64().unwrap();
+    assert!((rms - 0.2).abs() < 1e-12, "{rms}");
+    let table = folder.run(&format!("{compare} --attributes"));
+    let table = String::from_utf8_lossy(&table.stdout).into_owned();
+    assert!(table.contains("color (of full range), rms"), "{table}");
+    let found = json(folder.run(&format!("{compare} --json")));
+    assert_eq!(found[0]["attributes"], Value::Null);
+}
+
 /// A thread has a stack; ten thousand of them would be the longest part of the work.
 #[test]
 fn any_number_of_threads_is_accepted() {

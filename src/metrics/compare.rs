@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::attributes::{self, AttributeComparison, Carried, Side};
 use super::info::{Info, info_of_clean};
 use super::surface::{Curves, Surface};
 use crate::clean::clean;
@@ -28,7 +29,8 @@ impl Default for CompareOptions {
     }
 }
 
-/// Distances from the points of one thing to another, in model units.
+/// Distances from the points of one thing to another, in model units; or differences of what they
+/// carry.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Distances {
@@ -36,11 +38,21 @@ pub struct Distances {
     pub rms: f64,
     /// The mean.
     pub mean: f64,
-    /// The largest: one-sided Hausdorff distance, from samples and vertices.
+    /// The largest: one-sided Hausdorff distance, from samples and vertices; of attributes from
+    /// samples alone.
     pub max: f64,
 }
 
 impl Distances {
+    /// Those of both directions together.
+    pub(super) fn both(a: Self, b: Self) -> Self {
+        Self {
+            rms: ((a.rms * a.rms + b.rms * b.rms) / 2.0).sqrt(),
+            mean: (a.mean + b.mean) / 2.0,
+            max: a.max.max(b.max),
+        }
+    }
+
     fn times(self, factor: f64) -> Self {
         Self {
             rms: self.rms * factor,
@@ -72,11 +84,7 @@ pub struct TwoSided {
 impl TwoSided {
     fn of(from_reference: Distances, from_mesh: Distances, diagonal: f64) -> Self {
         let (a, b) = (from_reference, from_mesh);
-        let two_sided = Distances {
-            rms: ((a.rms * a.rms + b.rms * b.rms) / 2.0).sqrt(),
-            mean: (a.mean + b.mean) / 2.0,
-            max: a.max.max(b.max),
-        };
+        let two_sided = Distances::both(a, b);
         let share = 1.0 / diagonal;
         Self {
             two_sided,
@@ -119,6 +127,9 @@ pub struct Comparison {
     /// Pairs of the mesh's triangles that cut each other without sharing a vertex, where asked for.
     /// Triangles that overlap in one plane do not count.
     pub intersecting_pairs: Option<usize>,
+    /// How far what the mesh carries beside positions is from what the reference carries, where either
+    /// carries anything.
+    pub attributes: Option<AttributeComparison>,
     /// What is in the reference.
     pub reference: Info,
     /// What is in the mesh.
@@ -134,6 +145,7 @@ pub struct Reference {
     origin: DVec3,
     surface: Surface,
     curves: Curves,
+    carried: Carried,
 }
 
 impl Reference {
@@ -143,12 +155,13 @@ impl Reference {
     /// [`Error::InvalidMesh`] where cleaning leaves no triangle.
     pub fn new(mesh: IndexedMesh) -> Result<Self> {
         let origin = mesh.origin();
-        let (info, surface, curves) = prepare(mesh, origin)?;
+        let (info, surface, curves, carried) = prepare(mesh, origin)?;
         Ok(Self {
             info,
             origin,
             surface,
             curves,
+            carried,
         })
     }
 
@@ -159,7 +172,7 @@ impl Reference {
     /// [`Error::InvalidMesh`] where cleaning leaves no triangle, or the mesh lies so far away that
     /// squared distances are not finite (10¹⁵⁰).
     pub fn compare(&self, mesh: IndexedMesh, options: &CompareOptions) -> Result<Comparison> {
-        let (info, surface, curves) = prepare(mesh, self.origin)?;
+        let (info, surface, curves, carried) = prepare(mesh, self.origin)?;
         let diagonal = self.info.diagonal;
         let samples = options.samples;
         let mut angles = Vec::new();
@@ -175,6 +188,19 @@ impl Reference {
         });
         let (normal_deviation_mean_degrees, normal_deviation_99th_percentile_degrees) =
             mean_and_99th_percentile(&mut angles);
+        let (reference, mesh) = (
+            Side {
+                surface: &self.surface,
+                carried: &self.carried,
+            },
+            Side {
+                surface: &surface,
+                carried: &carried,
+            },
+        );
+        let carries_any = !self.carried.is_empty() || !carried.is_empty();
+        let attributes =
+            carries_any.then(|| attributes::compare(reference, mesh, diagonal, samples, SEED));
         let (triangle_quality_mean, sliver_share) = surface.quality();
         let more = |of: fn(&Info) -> usize| of(&info).saturating_sub(of(&self.info));
         Ok(Comparison {
@@ -189,6 +215,7 @@ impl Reference {
             new_non_manifold_edges: more(|i| i.non_manifold_edges),
             new_non_manifold_vertices: more(|i| i.non_manifold_vertices),
             intersecting_pairs: options.intersections.then(|| surface.intersecting_pairs()),
+            attributes,
             reference: self.info.clone(),
             mesh: info,
         })
@@ -210,7 +237,7 @@ pub fn compare(
 /// Squares of differences of coordinates below this are finite, and their sums too.
 const TOO_FAR: f64 = 1e150;
 
-fn prepare(mesh: IndexedMesh, origin: DVec3) -> Result<(Info, Surface, Curves)> {
+fn prepare(mesh: IndexedMesh, origin: DVec3) -> Result<(Info, Surface, Curves, Carried)> {
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangle_count());
     let (mesh, cleaning) = clean(mesh, true)?;
     if mesh.triangles().is_empty() {
@@ -226,8 +253,12 @@ fn prepare(mesh: IndexedMesh, origin: DVec3) -> Result<(Info, Surface, Curves)> 
     }
     let curves = Curves::of_boundary(&points, mesh.triangles());
     let surface = Surface::new(points, mesh.triangles());
+    let mut parts = mesh.into_parts();
+    let attributes = std::mem::take(&mut parts.attributes);
+    let carried = Carried::of(attributes, parts.positions.len(), &parts.triangles);
+    let mesh = IndexedMesh::from_valid(parts);
     let info = info_of_clean(mesh, vertices, triangles, cleaning);
-    Ok((info, surface, curves))
+    Ok((info, surface, curves, carried))
 }
 
 fn mean_and_99th_percentile(angles: &mut [f32]) -> (f64, f64) {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::compare::Distances;
 use crate::mesh::{Mesh, Small};
-use crate::nearest::{Nearest, Triangles};
+use crate::nearest::{Foot, Nearest, Triangles};
 
 /// Samples a thread takes at a time; sums are added block by block, so they do not depend on the
 /// number of threads.
@@ -18,6 +18,22 @@ struct Sums {
     distances: f64,
     max_squared: f64,
     angles: Vec<f32>,
+}
+
+impl Sums {
+    fn add(&mut self, nearest: &Nearest) {
+        self.squares += nearest.distance_squared;
+        self.distances += nearest.distance_squared.sqrt();
+        self.max_squared = self.max_squared.max(nearest.distance_squared);
+    }
+}
+
+/// A sample of a surface or of curves.
+pub(super) struct Sample {
+    /// The triangle or segment that it lies on, by its index in the caller's list.
+    pub(super) triangle: u32,
+    /// Where.
+    pub(super) foot: Foot,
 }
 
 /// A surface: triangles in spatial order over vertices.
@@ -64,8 +80,27 @@ impl Surface {
         seed: u64,
         angles: &mut Vec<f32>,
     ) -> Distances {
-        let names = self.set.names();
-        let sample = |i: usize, slot: usize| {
+        let sums = self.sample(other, samples, seed, &|sums: &mut Sums, sample, nearest| {
+            sums.add(nearest);
+            let here = self.normals[sample.triangle as usize];
+            let there = other.normals[nearest.triangle as usize];
+            let angle = here.dot(there).clamp(-1.0, 1.0).acos().to_degrees();
+            sums.angles.push(angle as f32);
+        });
+        let largest = largest_squared(&self.vertices, &other.set);
+        total(sums, samples, largest, angles)
+    }
+
+    /// Takes samples spread over this surface by area, the same for the same seed, and the points of
+    /// another nearest to them; `add` adds them up, in blocks whose sums come back in order.
+    pub(super) fn sample<T: Default + Send>(
+        &self,
+        other: &Self,
+        samples: usize,
+        seed: u64,
+        add: &(dyn Fn(&mut T, &Sample, &Nearest) + Sync),
+    ) -> Vec<T> {
+        let place = |i: usize, slot: usize| {
             let [a, b, c] = self.set.corners()[slot];
             let (u, v) = (
                 random(seed, 3 * i as u64 + 1),
@@ -76,23 +111,25 @@ impl Surface {
             } else {
                 (u, v)
             };
-            a + (b - a) * u + (c - a) * v
+            Sample {
+                triangle: self.set.names()[slot],
+                foot: Foot {
+                    point: a + (b - a) * u + (c - a) * v,
+                    weights: [1.0 - u - v, u, v],
+                },
+            }
         };
-        let angle = |slot: usize, nearest: &Nearest| {
-            let here = self.normals[names[slot] as usize];
-            let there = other.normals[nearest.triangle as usize];
-            here.dot(there).clamp(-1.0, 1.0).acos().to_degrees() as f32
-        };
-        let sums = sample_blocks(
-            &self.area_up_to,
-            samples,
-            seed,
-            &sample,
-            &other.set,
-            Some(&angle),
-        );
-        let largest = largest_squared(&self.vertices, &other.set);
-        total(sums, samples, largest, angles)
+        sample_blocks(&self.area_up_to, samples, seed, &place, &other.set, add)
+    }
+
+    /// The triangles, ready to be asked for nearest points.
+    pub(super) fn triangles(&self) -> &Triangles {
+        &self.set
+    }
+
+    /// The area.
+    pub(super) fn area(&self) -> f64 {
+        self.area_up_to.last().copied().unwrap_or(0.0)
     }
 
     /// The mean quality 4√3·area/Σ edge² and the share of triangles under 0.05.
@@ -188,11 +225,19 @@ impl Curves {
 
     /// The distances from samples spread over these curves by length to others.
     pub(super) fn distances_to(&self, other: &Self, samples: usize, seed: u64) -> Distances {
-        let sample = |i: usize, slot: usize| {
+        let place = |i: usize, slot: usize| {
             let [a, b, _] = self.set.corners()[slot];
-            a + (b - a) * random(seed, 3 * i as u64 + 1)
+            let t = random(seed, 3 * i as u64 + 1);
+            Sample {
+                triangle: self.set.names()[slot],
+                foot: Foot {
+                    point: a + (b - a) * t,
+                    weights: [1.0 - t, t, 0.0],
+                },
+            }
         };
-        let sums = sample_blocks(&self.length_up_to, samples, seed, &sample, &other.set, None);
+        let add = |sums: &mut Sums, _: &Sample, nearest: &Nearest| sums.add(nearest);
+        let sums = sample_blocks(&self.length_up_to, samples, seed, &place, &other.set, &add);
         let ends: Vec<DVec3> = self
             .set
             .corners()
@@ -232,39 +277,32 @@ fn random(seed: u64, i: u64) -> f64 {
     ((h ^ (h >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-type Angle<'a> = &'a (dyn Fn(usize, &Nearest) -> f32 + Sync);
-
-/// Takes stratified samples (the `i`-th in the `i`-th of equal parts of the size) and adds up their
-/// distances to a set, in blocks.
-fn sample_blocks(
+/// Takes stratified samples (the `i`-th in the `i`-th of equal parts of the size) and adds them up with
+/// the points of a set nearest to them, in blocks.
+fn sample_blocks<T: Default + Send>(
     size_up_to: &[f64],
     samples: usize,
     seed: u64,
-    sample: &(dyn Fn(usize, usize) -> DVec3 + Sync),
+    place: &(dyn Fn(usize, usize) -> Sample + Sync),
     to: &Triangles,
-    angle: Option<Angle>,
-) -> Vec<Sums> {
+    add: &(dyn Fn(&mut T, &Sample, &Nearest) + Sync),
+) -> Vec<T> {
     let size = size_up_to.last().copied().unwrap_or(0.0);
     let last = size_up_to.len().saturating_sub(1);
     (0..samples.div_ceil(BLOCK))
         .into_par_iter()
         .map(|block| {
-            let mut sums = Sums::default();
+            let mut sums = T::default();
             let mut guess = None;
             for i in block * BLOCK..samples.min((block + 1) * BLOCK) {
                 let part = (i as f64 + random(seed, 3 * i as u64)) / samples as f64 * size;
                 let slot = size_up_to.partition_point(|&s| s <= part).min(last);
-                let point = sample(i, slot);
-                let Some(nearest) = to.nearest_from(point, guess) else {
+                let sample = place(i, slot);
+                let Some(nearest) = to.nearest_from(sample.foot.point, guess) else {
                     continue;
                 };
                 guess = Some(nearest.slot);
-                sums.squares += nearest.distance_squared;
-                sums.distances += nearest.distance_squared.sqrt();
-                sums.max_squared = sums.max_squared.max(nearest.distance_squared);
-                if let Some(angle) = angle {
-                    sums.angles.push(angle(slot, &nearest));
-                }
+                add(&mut sums, &sample, &nearest);
             }
             sums
         })

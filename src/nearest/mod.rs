@@ -14,6 +14,7 @@ mod patch;
 mod triangle;
 
 use glam::{DVec3, Vec3, Vec4};
+use smallvec::{SmallVec, smallvec};
 
 pub(crate) use lanes::{Faces, Points};
 pub(crate) use patch::{GROUP, Near, Patch};
@@ -278,7 +279,7 @@ impl Triangles {
         // Three wait at each level, and there are at most 16 levels.
         let mut stack = [(0.0f32, 0u32); 64];
         let mut depth = 1;
-        let mut limit = self.limit(&best);
+        let mut limit = self.limit(best.distance_squared);
         while depth > 0 {
             depth -= 1;
             let (distance, node) = stack[depth];
@@ -296,7 +297,7 @@ impl Triangles {
                     Child::None => {}
                     Child::Triangle(slot) => {
                         if distance <= limit && self.try_slot(p, slot, &mut best) {
-                            limit = self.limit(&best);
+                            limit = self.limit(best.distance_squared);
                         }
                     }
                     Child::Node(offset) => {
@@ -315,9 +316,9 @@ impl Triangles {
         best.distance_squared.is_finite().then_some(best)
     }
 
-    /// What a box's squared distance must not exceed for it to hold something as near as `best`.
-    fn limit(&self, best: &Nearest) -> f32 {
-        (best.distance_squared * (self.unit.scale * self.unit.scale * SLACK)) as f32
+    /// What a box's squared distance must not exceed for it to hold something as near as this.
+    fn limit(&self, distance_squared: f64) -> f32 {
+        (distance_squared * (self.unit.scale * self.unit.scale * SLACK)) as f32
     }
 
     /// Whether the triangle is nearer than `best`, which it then is.
@@ -337,6 +338,33 @@ impl Triangles {
             };
         }
         is_better
+    }
+
+    /// Calls `visit` with the index of each triangle that is no farther from `p` than `distance`, and
+    /// the point of it that is nearest.
+    pub fn for_each_within(&self, p: DVec3, distance: f64, mut visit: impl FnMut(u32, &Foot)) {
+        if self.is_empty() {
+            return;
+        }
+        let around_p = self.unit.around(p);
+        let limit = self.limit(distance * distance);
+        let mut stack: SmallVec<[u32; 64]> = smallvec![0];
+        while let Some(node) = stack.pop() {
+            let at = &self.nodes[node as usize];
+            let near = at.distances_squared(&around_p).cmple(Vec4::splat(limit));
+            for lane in lanes(near.bitmask()) {
+                match at.children[lane] {
+                    Child::None => {}
+                    Child::Node(offset) => stack.push(node + offset),
+                    Child::Triangle(slot) => {
+                        let foot = foot_on_triangle(p, &self.corners[slot as usize]);
+                        if foot.point.distance_squared(p) <= distance * distance {
+                            visit(self.names[slot as usize], &foot);
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Calls `visit` with the indices of all pairs whose boxes overlap, the smaller first.
@@ -568,6 +596,28 @@ mod tests {
             }
         }
         assert_eq!(Triangles::new(Vec::new()).nearest(DVec3::ZERO), None);
+    }
+
+    /// All triangles within a distance, each once, with the foot that the triangle alone has.
+    #[test]
+    fn within_equals_brute_force() {
+        for (seed, n) in [(1, 1), (6, 40), (7, 700)] {
+            let mut random = Random(seed);
+            let list = triangles(n, &mut random);
+            let set = Triangles::new(list.clone());
+            for k in 0..100 {
+                let (p, distance) = (1.5 * random.point(), f64::from(k) / 100.0);
+                let feet = (0u32..)
+                    .zip(&list)
+                    .map(|(i, t)| (i, foot_on_triangle(p, t)));
+                let is_near = |foot: &Foot| foot.point.distance_squared(p) <= distance * distance;
+                let expected: Vec<_> = feet.filter(|(_, foot)| is_near(foot)).collect();
+                let mut found = Vec::new();
+                set.for_each_within(p, distance, |i, foot| found.push((i, *foot)));
+                found.sort_by_key(|&(i, _)| i);
+                assert_eq!(found, expected, "seed {seed}, distance {distance}");
+            }
+        }
     }
 
     /// Every pair of triangles whose boxes overlap, once.

@@ -7,7 +7,6 @@ use decimate::clean::clean;
 use decimate::decimate::{Options, Targets, TierChoice, decimate};
 use decimate::error::{Error, Result};
 use decimate::indexed_mesh::IndexedMesh;
-use decimate::io::{self, ReadOptions};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 
@@ -138,9 +137,9 @@ impl<'a> Contest<'a> {
     /// Reads, welds and cleans `path`.
     ///
     /// # Errors
-    /// As [`io::read`] and [`clean`], and where the arrays for `python` cannot be written.
+    /// As `read` and [`clean`], and where the arrays for `python` cannot be written.
     pub fn new(path: &Path, settings: &'a [Setting], python: Option<&PathBuf>) -> Result<Self> {
-        let (mesh, _) = clean(io::read(path, &ReadOptions::default())?, true)?;
+        let (mesh, _) = clean(crate::read(path)?, true)?;
         let fast_simplification = python
             .map(|python| FastSimplification::new(python, &mesh))
             .transpose()?;

@@ -23,6 +23,8 @@ pub enum Command {
     /// Simplifies with meshoptimizer's simplifyWithUpdate and prints the seconds and megabytes of
     /// the call alone as JSON.
     Simplify(SimplifyArgs),
+    /// Simplifies with attributes in the cost, as meshoptimizer does it, and prints the same.
+    Attributes(AttributesArgs),
     /// Runs ours and meshoptimizer's simplifyWithUpdate in turns, arrays in and arrays out, and
     /// prints a table of the times.
     Against(AgainstArgs),
@@ -42,6 +44,31 @@ pub struct SimplifyArgs {
     /// Where the result goes, without the vertices that no triangle uses.
     #[arg(value_name = "OUT.ply")]
     pub output: PathBuf,
+}
+
+/// The arguments of `race attributes`.
+#[derive(Debug, Args)]
+pub struct AttributesArgs {
+    /// The mesh, in any format that the library reads with its attributes.
+    pub mesh: PathBuf,
+    /// How many triangles to keep.
+    pub triangles: usize,
+    /// Where the result goes, without the vertices that no triangle uses.
+    #[arg(value_name = "OUT.ply")]
+    pub output: PathBuf,
+    /// Which of meshoptimizer's functions.
+    #[arg(long, value_enum, default_value_t)]
+    pub method: Method,
+}
+
+/// `--method`.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum Method {
+    /// simplifyWithUpdate: vertices and attributes move
+    #[default]
+    Update,
+    /// simplifyWithAttributes: vertices stay where they are, with what they have
+    Attributes,
 }
 
 /// The arguments of `race against`. A list is given with commas or by repeating the option.

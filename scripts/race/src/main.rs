@@ -2,6 +2,7 @@
 //! and exits.
 
 mod against;
+mod attributed;
 mod cli;
 mod fast_simplification;
 mod generate;
@@ -21,13 +22,15 @@ use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{self, ReadOptions, WriteOptions};
 
 use against::{Case, Contest};
-use cli::{AgainstArgs, Cli, Command, GenerateArgs, ShuffleArgs, SimplifyArgs};
-use measure::measure;
+use attributed::AttributedArrays;
+use cli::{AgainstArgs, AttributesArgs, Cli, Command, GenerateArgs, ShuffleArgs, SimplifyArgs};
+use measure::{Measured, measure};
 use subdivide::subdivide;
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Simplify(args) => simplify(&args),
+        Command::Attributes(args) => simplify_attributed(&args),
         Command::Against(args) => race(&args),
         Command::Generate(args) => generate(&args),
         Command::Shuffle(args) => shuffle(&args),
@@ -45,9 +48,21 @@ fn simplify(args: &SimplifyArgs) -> Result<()> {
     let mut arrays = meshoptimizer::Arrays::from(&read(&args.mesh)?);
     let ((), measured) = measure(|| arrays.simplify_with_update(args.triangles));
     write(&args.output, &arrays.into_mesh()?)?;
-    let numbers = serde_json::to_string(&measured).expect("two numbers are JSON");
-    println!("{numbers}");
+    print_measured(&measured);
     Ok(())
+}
+
+fn simplify_attributed(args: &AttributesArgs) -> Result<()> {
+    let mut arrays = AttributedArrays::of(io::read(&args.mesh, &ReadOptions::default())?)?;
+    let ((), measured) = measure(|| arrays.simplify(args.triangles, args.method));
+    write(&args.output, &arrays.into_mesh()?)?;
+    print_measured(&measured);
+    Ok(())
+}
+
+fn print_measured(measured: &Measured) {
+    let numbers = serde_json::to_string(measured).expect("two numbers are JSON");
+    println!("{numbers}");
 }
 
 fn race(args: &AgainstArgs) -> Result<()> {
@@ -89,8 +104,13 @@ fn shuffle(args: &ShuffleArgs) -> Result<()> {
     write(&args.output, &shuffle::shuffle(&mesh, args.seed)?)
 }
 
+/// Positions and triangles alone: what the others are given.
 fn read(path: &Path) -> Result<IndexedMesh> {
-    io::read(path, &ReadOptions::default())
+    let options = ReadOptions {
+        attributes: false,
+        ..ReadOptions::default()
+    };
+    io::read(path, &options)
 }
 
 fn write(path: &Path, mesh: &IndexedMesh) -> Result<()> {
