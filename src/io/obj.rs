@@ -13,7 +13,7 @@ use crate::indexed_mesh::MeshBuilder;
 
 use super::groups::{GroupTable, NAMES_TOO_LONG};
 use super::input::Input;
-use super::text::{Lines, count, parse_integer, parse_number, quote};
+use super::text::{Lines, count, name_of, parse_integer, parse_number, quote};
 use super::wedges::{Rows, Wedges};
 
 /// Reads an OBJ file into a mesh; of what it carries beside nothing unless `attributes`. A face of one or
@@ -231,7 +231,7 @@ impl Carried {
             b"mtllib" => {
                 let libraries = &mut builder.attributes().material_libraries;
                 let library = rest_of(lines);
-                if libraries.last() != Some(&library) {
+                if !library.is_empty() && libraries.last() != Some(&library) {
                     libraries.push(library);
                 }
             }
@@ -389,8 +389,8 @@ fn rest_of(lines: &Lines) -> String {
     let word = line.iter().position(u8::is_ascii_whitespace);
     let rest = line[word.unwrap_or(line.len())..].trim_ascii();
     match std::str::from_utf8(rest) {
-        Ok(name) => name.to_string(),
-        Err(_) => rest.iter().copied().map(char::from).collect(),
+        Ok(name) => name_of(name),
+        Err(_) => name_of(&rest.iter().copied().map(char::from).collect::<String>()),
     }
 }
 
