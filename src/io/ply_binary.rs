@@ -362,8 +362,9 @@ impl Faces {
             [0, 4, 8].map(|at| u32::from_le_bytes(low_first::<BIG, 4>(&list[at..])))
         };
         let is_triangle =
-            |face: &&[u8]| face[before] == 3 && corners(face).iter().all(|&v| v < vertices);
-        let n = faces.clone().take_while(is_triangle).count();
+            |face: &[u8]| face[before] == 3 && corners(face).iter().all(|&v| v < vertices);
+        let other = faces.clone().position(|face| !is_triangle(face));
+        let n = other.unwrap_or(faces.len());
         sink.builder.push_triangles(faces.take(n).map(corners));
         n
     }

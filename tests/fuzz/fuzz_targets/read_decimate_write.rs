@@ -139,7 +139,12 @@ fn check_carried(mesh: &IndexedMesh, back: &IndexedMesh, format: Format) {
     // doubles singles.
     for channel in &mesh.attributes().channels {
         let is_same_kind = |c: &&Channel| c.kind == channel.kind;
-        let count = mesh.attributes().channels.iter().filter(is_same_kind).count();
+        let count = mesh
+            .attributes()
+            .channels
+            .iter()
+            .filter(is_same_kind)
+            .count();
         let is_single = |p: &Property| p.number == NumberType::F32;
         let is_kept = format == Format::Ply || channel.components.iter().all(is_single);
         let has_place = format == Format::Ply || channel.kind != Kind::Scalar;
@@ -159,9 +164,23 @@ fn check_carried(mesh: &IndexedMesh, back: &IndexedMesh, format: Format) {
             });
             let row = |wedge: u32| channel.row(wedge as usize).take(width);
             // Zero has no sign in integers.
-            let bits = |x: f64| if x.is_nan() { None } else { Some((x + 0.0).to_bits()) };
-            sides.flatten().map(|wedge| row(wedge).map(bits).collect()).collect()
+            let bits = |x: f64| {
+                if x.is_nan() {
+                    None
+                } else {
+                    Some((x + 0.0).to_bits())
+                }
+            };
+            sides
+                .flatten()
+                .map(|wedge| row(wedge).map(bits).collect())
+                .collect()
         };
-        assert_eq!(rows(mesh, channel), rows(back, other), "{:?}", channel.components);
+        assert_eq!(
+            rows(mesh, channel),
+            rows(back, other),
+            "{:?}",
+            channel.components
+        );
     }
 }

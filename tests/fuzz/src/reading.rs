@@ -53,7 +53,12 @@ pub fn attack_reader(format: Format, bytes: &[u8], heap: &PeakAlloc) {
         attributes: false,
         ..ReadOptions::default()
     };
-    let bare = io::read_from(Path::new(NAME), Cursor::new(bytes.to_vec()), length, &options);
+    let bare = io::read_from(
+        Path::new(NAME),
+        Cursor::new(bytes.to_vec()),
+        length,
+        &options,
+    );
     check_answer(&bare, format);
     if let (Ok(bare), Ok(whole)) = (&bare, &whole) {
         assert_eq!(bare.triangles(), whole.triangles(), "without attributes");
