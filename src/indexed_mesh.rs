@@ -209,7 +209,8 @@ impl IndexedMesh {
         self.triangles.len() + self.double_sided.iter().filter(|&&d| d).count()
     }
 
-    /// The triangles as a file holds them: behind each double-sided one stands its opposite.
+    /// The triangles as a file holds them: behind each double-sided one stands its opposite, whose corners
+    /// have the same wedges (normals are not turned).
     pub fn sides(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.triangles
             .iter()

@@ -15,8 +15,8 @@ pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
     match format {
         Format::Ply => {
             let columns = Columns::of(attributes);
-            if !columns.have_names() {
-                lost.push("names of groups that take more than a header may".to_string());
+            if !columns.has_comments {
+                lost.push("names that take so much room".to_string());
             }
             let properties = attributes.face_properties.iter().enumerate();
             let properties = properties.filter(|&(i, _)| !columns.has_value(i));

@@ -2,14 +2,15 @@
 //!
 //! | format | read | written |
 //! |---|---|---|
-//! | PLY | ASCII, binary of both byte orders; polygons, triangle strips | binary little-endian, ASCII |
-//! | OBJ | `v` and `f` lines; groups and objects are one mesh | text |
+//! | PLY | ASCII, binary of both byte orders; polygons, triangle strips; properties of vertices, parts and texture coordinates of faces | binary little-endian, ASCII |
+//! | OBJ | `v`, `vt`, `vn` and `f` lines; objects, groups and materials are one mesh | text |
 //! | STL | binary, ASCII; every facet has three vertices of its own | binary, ASCII |
 //! | OFF | OFF, COFF, NOFF, CNOFF, STOFF as text | text |
 //!
 //! Files are read in blocks, from standard input as from disk. What a header promises sizes no
-//! allocation beyond what the length of the file bears out; what is neither connectivity nor
-//! position, nor the weight asked for, is skipped.
+//! allocation beyond what the length of the file bears out. What a mesh carries beside positions are
+//! its [attributes](IndexedMesh::attributes): what of a file is left behind is said there, and
+//! [`cannot_carry`] says what a format has no place for.
 
 mod blocks;
 mod cannot_carry;

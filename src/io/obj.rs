@@ -13,7 +13,7 @@ use crate::indexed_mesh::MeshBuilder;
 
 use super::groups::{GroupTable, NAMES_TOO_LONG};
 use super::input::Input;
-use super::text::{Lines, count, parse_integer, parse_number, quote};
+use super::text::{Lines, count, name_of, parse_integer, parse_number, quote};
 use super::wedges::{Rows, Wedges};
 
 /// Reads an OBJ file into a mesh; of what it carries beside nothing unless `attributes`. A face of one or
@@ -38,12 +38,15 @@ pub(super) fn read(input: Input, attributes: bool, builder: &mut MeshBuilder) ->
                 any = true;
                 let vertices = builder.vertex_count();
                 corners.clear();
+                let mut only_vertices = true;
                 for word in words {
-                    corners.push(parse_corner(word, vertices, &lines)?);
+                    let (v, is_all) = parse_corner(word, vertices, &lines)?;
+                    corners.push(v);
+                    only_vertices &= is_all;
                 }
                 highest.see(&corners, lines.number());
                 match &mut carried {
-                    Some(carried) => carried.push_face(&lines, &corners, builder),
+                    Some(carried) => carried.push_face(&lines, &corners, only_vertices, builder),
                     None => builder.push_polygon(&corners),
                 }
             }
@@ -200,6 +203,10 @@ impl Carried {
     /// Takes the colour behind the coordinates of the last of so many vertices. What is no three numbers
     /// is none, as a weight is.
     fn take_color<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>, vertices: usize) {
+        let mut words = words.peekable();
+        if self.colors.is_empty() && words.peek().is_none() {
+            return;
+        }
         let mut color = [WHITE; 3];
         let mut numbers = words.take(3).map_while(parse_number);
         let found = color.iter_mut().zip(&mut numbers);
@@ -231,7 +238,7 @@ impl Carried {
             b"mtllib" => {
                 let libraries = &mut builder.attributes().material_libraries;
                 let library = rest_of(lines);
-                if libraries.last() != Some(&library) {
+                if !library.is_empty() && libraries.last() != Some(&library) {
                     libraries.push(library);
                 }
             }
@@ -261,7 +268,13 @@ impl Carried {
     }
 
     /// Adds the face of the current line.
-    fn push_face(&mut self, lines: &Lines, corners: &[u32], builder: &mut MeshBuilder) {
+    fn push_face(
+        &mut self,
+        lines: &Lines,
+        corners: &[u32],
+        only_vertices: bool,
+        builder: &mut MeshBuilder,
+    ) {
         if corners.len() < 3 {
             return;
         }
@@ -271,7 +284,7 @@ impl Carried {
             groups.begin(&self.names, builder);
         }
         let vertices = builder.vertex_count();
-        if self.wedges.is_none() && lines.line().contains(&b'/') {
+        if self.wedges.is_none() && !only_vertices {
             let mut wedges = Wedges::default();
             let mut of = |&v: &u32| wedges.of(v, [0; 2], vertices);
             let so_far = builder.triangles().iter();
@@ -389,15 +402,15 @@ fn rest_of(lines: &Lines) -> String {
     let word = line.iter().position(u8::is_ascii_whitespace);
     let rest = line[word.unwrap_or(line.len())..].trim_ascii();
     match std::str::from_utf8(rest) {
-        Ok(name) => name.to_string(),
-        Err(_) => rest.iter().copied().map(char::from).collect(),
+        Ok(name) => name_of(name),
+        Err(_) => name_of(&rest.iter().copied().map(char::from).collect::<String>()),
     }
 }
 
-/// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0.
+/// The vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0, and whether the word names no more.
 ///
 /// A positive one may stand in a later line, so only the end of the file tells whether it is there.
-fn parse_corner(word: &[u8], vertices: usize, lines: &Lines) -> Result<u32> {
+fn parse_corner(word: &[u8], vertices: usize, lines: &Lines) -> Result<(u32, bool)> {
     let v = word.split(|&b| b == b'/').next().unwrap_or_default();
     let index = parse_integer(v).ok_or_else(|| {
         lines.error(
@@ -415,14 +428,15 @@ fn parse_corner(word: &[u8], vertices: usize, lines: &Lines) -> Result<u32> {
         }
         _ => index.saturating_add(vertices as i64),
     };
-    u32::try_from(from_zero).map_err(|_| {
+    let vertex = u32::try_from(from_zero).map_err(|_| {
         let expected = match vertices {
             0 => "a vertex before the face".to_string(),
             1 => "-1, the only vertex before the face".to_string(),
             n => format!("-1 to -{n}, the vertices before the face"),
         };
         lines.error(&format!("face uses vertex {index}"), &expected)
-    })
+    })?;
+    Ok((vertex, v.len() == word.len()))
 }
 
 /// The highest vertex that a face names, and where.

@@ -48,6 +48,9 @@ pub(super) fn obj(
     digits: Option<usize>,
 ) -> io::Result<()> {
     let attributes = mesh.attributes();
+    if attributes.is_empty() {
+        return bare(writer, mesh, digits);
+    }
     for library in &attributes.material_libraries {
         write_name(writer, "mtllib", library)?;
     }
@@ -90,26 +93,34 @@ pub(super) fn obj(
         }
         let back = mesh.is_double_sided(i).then_some([0, 2, 1]);
         for order in std::iter::once([0, 1, 2]).chain(back) {
-            let from_one = |k: usize| u64::from(corners[k]) + 1;
-            let [a, b, c] = order.map(from_one);
-            let [texture_coordinates, normals] = &numbers;
-            if texture_coordinates.is_empty() && normals.is_empty() {
-                writeln!(writer, "f {a} {b} {c}")?;
-                continue;
-            }
             writer.write_all(b"f")?;
             for k in order {
-                let wedge = attributes.corners[i][k] as usize;
-                write!(writer, " {}/", from_one(k))?;
-                if let Some(t) = texture_coordinates.get(wedge) {
-                    write!(writer, "{}", t + 1)?;
-                }
-                if let Some(n) = normals.get(wedge) {
-                    write!(writer, "/{}", n + 1)?;
+                let v = u64::from(corners[k]) + 1;
+                let wedge = || attributes.corners[i][k] as usize;
+                let [t, n] = &numbers;
+                match (t.is_empty(), n.is_empty()) {
+                    (true, true) => write!(writer, " {v}")?,
+                    (false, true) => write!(writer, " {v}/{}", t[wedge()] + 1)?,
+                    (true, false) => write!(writer, " {v}//{}", n[wedge()] + 1)?,
+                    (false, false) => write!(writer, " {v}/{}/{}", t[wedge()] + 1, n[wedge()] + 1)?,
                 }
             }
             writer.write_all(b"\n")?;
         }
+    }
+    Ok(())
+}
+
+/// Writes a mesh that carries nothing.
+fn bare(writer: &mut dyn Write, mesh: &IndexedMesh, digits: Option<usize>) -> io::Result<()> {
+    for v in 0..mesh.positions().len() {
+        writer.write_all(b"v ")?;
+        write_point(writer, mesh, v, digits)?;
+        writer.write_all(b"\n")?;
+    }
+    for [a, b, c] in mesh.sides() {
+        let from_one = |v| u64::from(v) + 1;
+        writeln!(writer, "f {} {} {}", from_one(a), from_one(b), from_one(c))?;
     }
     Ok(())
 }

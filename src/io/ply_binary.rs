@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use ply_rs_bw::ply::{ElementDef, PropertyType, ScalarType};
 
-use crate::attributes::Values;
+use crate::attributes::{MAX_COMPONENTS, Values};
 use crate::error::{Error, Place, Result};
 
 use super::blocks::Blocks;
@@ -362,8 +362,9 @@ impl Faces {
             [0, 4, 8].map(|at| u32::from_le_bytes(low_first::<BIG, 4>(&list[at..])))
         };
         let is_triangle =
-            |face: &&[u8]| face[before] == 3 && corners(face).iter().all(|&v| v < vertices);
-        let n = faces.clone().take_while(is_triangle).count();
+            |face: &[u8]| face[before] == 3 && corners(face).iter().all(|&v| v < vertices);
+        let other = faces.clone().position(|face| !is_triangle(face));
+        let n = other.unwrap_or(faces.len());
         sink.builder.push_triangles(faces.take(n).map(corners));
         n
     }
@@ -423,7 +424,7 @@ struct Face {
     texture_coordinates: Vec<f64>,
 }
 
-/// Adds the numbers of each element, one type of them at a time where they have one.
+/// Adds the numbers of each element; where they have one of the usual types, that is asked for once.
 fn push_numbers<'a, const BIG: bool>(
     values: &mut Values,
     numbers: &[Number],
@@ -433,10 +434,10 @@ fn push_numbers<'a, const BIG: bool>(
     match values {
         Values::Singles(list) if is_all(ScalarType::Float) => {
             let single = |bytes: &[u8]| f32::from_le_bytes(low_first::<BIG, 4>(bytes));
-            extend(list, numbers, elements, single);
+            gather(list, numbers, elements, single);
         }
         Values::Singles(list) if is_all(ScalarType::UChar) => {
-            extend(list, numbers, elements, |bytes: &[u8]| bytes[0].into());
+            gather(list, numbers, elements, |bytes: &[u8]| bytes[0].into());
         }
         values => {
             for element in elements {
@@ -447,19 +448,29 @@ fn push_numbers<'a, const BIG: bool>(
     }
 }
 
-/// Adds what `read` finds at each number of each element; the usual three are taken at once.
-fn extend<'a>(
+/// Adds what `read` finds at each number of each element.
+fn gather<'a>(
     list: &mut Vec<f32>,
     numbers: &[Number],
     elements: impl Iterator<Item = &'a [u8]>,
     read: impl Fn(&[u8]) -> f32,
 ) {
-    if let [x, y, z] = numbers {
-        let [x, y, z] = [x.at, y.at, z.at];
-        list.extend(elements.flat_map(|element| [x, y, z].map(|at| read(&element[at..]))));
-    } else {
-        for element in elements {
-            list.extend(numbers.iter().map(|number| read(&element[number.at..])));
+    fn gather<'a, const N: usize>(
+        list: &mut Vec<f32>,
+        numbers: &[Number],
+        elements: impl Iterator<Item = &'a [u8]>,
+        read: impl Fn(&[u8]) -> f32,
+    ) {
+        let places: [usize; N] = std::array::from_fn(|k| numbers[k].at);
+        list.extend(elements.flat_map(|element| places.map(|at| read(&element[at..]))));
+    }
+    match numbers.len() {
+        1 => gather::<1>(list, numbers, elements, read),
+        2 => gather::<2>(list, numbers, elements, read),
+        3 => gather::<3>(list, numbers, elements, read),
+        n => {
+            assert_eq!(n, MAX_COMPONENTS, "components of a channel");
+            gather::<MAX_COMPONENTS>(list, numbers, elements, read);
         }
     }
 }

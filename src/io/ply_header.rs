@@ -10,7 +10,7 @@ use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, PropertyType, ScalarT
 use crate::error::{Place, Result};
 
 use super::input::Input;
-use super::text::{quote, words};
+use super::text::{name_of, quote, words};
 
 /// What the list of a face's corners is called here, whichever name it has in the file.
 pub(super) const CORNERS: &str = "vertex_indices";
@@ -65,8 +65,10 @@ impl Comments {
     /// Takes what stands behind the word `comment`.
     fn push(&mut self, comment: &str) {
         let split = |text: &str| {
-            let (word, rest) = text.trim().split_once(|c: char| c.is_ascii_whitespace())?;
-            Some((word.to_string(), rest.trim().to_string()))
+            let (word, rest) = text
+                .trim_ascii()
+                .split_once(|c: char| c.is_ascii_whitespace())?;
+            Some((word.to_string(), name_of(rest)))
         };
         let Some((keyword, rest)) = split(comment) else {
             return;
@@ -297,7 +299,7 @@ impl<'a> Tidy<'a> {
     /// Appends a line with single blanks, without the text of comments, and with names that differ.
     fn push(&mut self, line: &[u8]) {
         let line = String::from_utf8_lossy(line);
-        if let Some(comment) = line.trim_start().strip_prefix("comment") {
+        if let Some(comment) = line.trim_ascii().strip_prefix("comment") {
             self.comments.push(comment);
         }
         let words: Vec<&str> = line.split_ascii_whitespace().collect();

@@ -78,6 +78,8 @@ pub(super) struct Columns<'a> {
     names: [Option<(Vec<&'a str>, Vec<Option<u32>>)>; 3],
     /// Which of [`Attributes::face_properties`] are there.
     values: Vec<usize>,
+    /// Whether comments are: a header can be too long to be one.
+    pub has_comments: bool,
     attributes: &'a Attributes,
 }
 
@@ -109,28 +111,24 @@ impl<'a> Columns<'a> {
         let mut columns = Columns {
             names,
             values,
+            has_comments: true,
             attributes,
         };
-        if columns.names_are_too_long() {
+        if columns.comment_bytes() > MAX_HEADER_BYTES / 2 {
             columns.names = [None, None, None];
+            columns.has_comments = false;
         }
         columns
     }
 
-    fn names_are_too_long(&self) -> bool {
+    /// About how many bytes all comments take.
+    fn comment_bytes(&self) -> usize {
         let lists = self.names.iter().flatten();
-        let names = lists.flat_map(|(list, _)| list);
-        let bytes: usize = names
-            .map(|name| name.len() + "comment material 1234567890 ".len())
-            .sum();
-        bytes > MAX_HEADER_BYTES / 2
-    }
-
-    /// Whether the names of groups are there, if they have any.
-    pub fn have_names(&self) -> bool {
-        let has_name =
-            |g: &Group| !(g.object.is_empty() && g.name.is_empty() && g.material.is_empty());
-        self.names.iter().any(Option::is_some) || !self.attributes.groups.iter().any(has_name)
+        let names = lists.flat_map(|(list, _)| list.iter().map(|name| name.len()));
+        let libraries = self.attributes.material_libraries.iter();
+        let others = libraries.chain(&self.attributes.textures).map(String::len);
+        let beside = "comment material 1234567890 \n".len();
+        names.chain(others).map(|bytes| bytes + beside).sum()
     }
 
     /// Whether a face property is there.
@@ -156,8 +154,10 @@ impl File<'_> {
             "binary_little_endian 1.0\n"
         };
         let mut comment = |words: &str, name: &str| {
-            let name: String = without_control(name).collect();
-            header += &format!("comment {words} {name}\n");
+            if self.columns.has_comments {
+                let name: String = without_control(name).collect();
+                header += &format!("comment {words} {name}\n");
+            }
         };
         attributes
             .textures
@@ -175,22 +175,15 @@ impl File<'_> {
         let vertices = self.vertices.count(self.mesh.positions().len());
         header += &format!("element vertex {vertices}\n");
         let mut used = HashSet::new();
-        let mut property = |name: &str, number: NumberType| {
-            let is_separator = |c: char| c.is_whitespace() || c.is_control();
-            let mut name = name.replace(is_separator, "_");
-            while name.is_empty() || !used.insert(name.clone()) {
-                name.push('_');
-            }
-            format!("property {} {name}\n", type_name(number))
-        };
         for axis in AXES {
-            header += &property(axis, self.coordinate());
+            header += &property(&mut used, axis, self.coordinate());
         }
         for component in self.channels.iter().flat_map(|channel| &channel.components) {
-            header += &property(&component.name, component.number);
+            header += &property(&mut used, &component.name, component.number);
         }
         header += &format!("element face {}\n", self.mesh.triangle_count());
         header += "property list uchar int vertex_indices\n";
+        used.clear();
         if let Some(list) = self.list {
             let number = type_name(number_of(list));
             header += &format!("property list uchar {number} {TEXTURE_COORDINATES}\n");
@@ -198,14 +191,14 @@ impl File<'_> {
         if !attributes.group_of.is_empty() {
             for &i in &self.columns.values {
                 let value = &attributes.face_properties[i];
-                header += &property(&value.name, value.number);
+                header += &property(&mut used, &value.name, value.number);
             }
             for ((name, _), _) in NAMED
                 .iter()
                 .zip(&self.columns.names)
                 .filter(|(_, names)| names.is_some())
             {
-                header += &property(name, NumberType::I32);
+                header += &property(&mut used, name, NumberType::I32);
             }
         }
         header += "end_header\n";
@@ -268,6 +261,16 @@ impl File<'_> {
         }
         Ok(())
     }
+}
+
+/// The line of a property, whose name becomes one word that none of the element's before it is.
+fn property(used: &mut HashSet<String>, name: &str, number: NumberType) -> String {
+    let is_separator = |c: char| c.is_whitespace() || c.is_control();
+    let mut name = name.replace(is_separator, "_");
+    while name.is_empty() || !used.insert(name.clone()) {
+        name.push('_');
+    }
+    format!("property {} {name}\n", type_name(number))
 }
 
 /// The number of no name.

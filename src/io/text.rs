@@ -220,6 +220,12 @@ pub(super) fn without_control(text: &str) -> impl Iterator<Item = char> + '_ {
     text.chars().map(clean)
 }
 
+/// A name as it is kept: on one line, without blanks around it.
+pub(super) fn name_of(text: &str) -> String {
+    let name: String = without_control(text).collect();
+    name.trim_ascii().to_string()
+}
+
 /// A piece of a file as a message repeats it: in quotes, shortened.
 pub(super) fn quote(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * QUOTE_CHARS)]);

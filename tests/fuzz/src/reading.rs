@@ -3,6 +3,7 @@
 use std::io::{Cursor, Read};
 use std::path::Path;
 
+use decimate::attributes::Attributes;
 use decimate::error::{Error, Result};
 use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{self, Format, ReadOptions};
@@ -46,6 +47,23 @@ pub fn attack_reader(format: Format, bytes: &[u8], heap: &PeakAlloc) {
             assert_eq!(weighted.triangles(), plain.triangles());
         }
     }
+
+    let options = ReadOptions {
+        format: Some(format),
+        attributes: false,
+        ..ReadOptions::default()
+    };
+    let bare = io::read_from(
+        Path::new(NAME),
+        Cursor::new(bytes.to_vec()),
+        length,
+        &options,
+    );
+    check_answer(&bare, format);
+    if let (Ok(bare), Ok(whole)) = (&bare, &whole) {
+        assert_eq!(bare.triangles(), whole.triangles(), "without attributes");
+        assert_eq!(bare.attributes(), &Attributes::default());
+    }
 }
 
 fn read(
@@ -86,6 +104,13 @@ pub fn check_answer(answer: &Result<IndexedMesh>, format: Format) {
             let n = mesh.positions().len();
             let is_there = |&v: &u32| (v as usize) < n;
             assert!(mesh.triangles().iter().flatten().all(is_there));
+            let attributes = mesh.attributes().clone();
+            let checked = mesh.clone().with_attributes(attributes);
+            checked.expect("what a mesh carries fits it");
+            for notice in &mesh.attributes().notices {
+                assert!(!notice.contains(char::is_control), "{notice:?}");
+                assert!(notice.chars().count() <= LONGEST_MESSAGE, "{notice:?}");
+            }
         }
         Err(
             error @ Error::Parse {
@@ -105,11 +130,12 @@ pub fn check_answer(answer: &Result<IndexedMesh>, format: Format) {
 /// An answer in a form that is equal where it says the same: NaN is equal to itself.
 fn told(
     answer: &Result<IndexedMesh>,
-) -> std::result::Result<(Vec<[u32; 3]>, Vec<[u64; 3]>), String> {
+) -> std::result::Result<(Vec<[u32; 3]>, Vec<[u64; 3]>, String), String> {
     match answer {
         Ok(mesh) => {
             let bits = mesh.points().map(|p| p.to_array().map(f64::to_bits));
-            Ok((mesh.triangles().to_vec(), bits.collect()))
+            let carried = format!("{:?}", mesh.attributes());
+            Ok((mesh.triangles().to_vec(), bits.collect(), carried))
         }
         Err(error) => Err(error.to_string()),
     }
