@@ -1,10 +1,11 @@
-//! Writing: the file beside that takes its place when it is whole, and the formats but OBJ.
+//! Writing: the file beside that takes its place when it is whole, and the formats but OBJ and glTF.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::attributes::{Attributes, Channel};
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
 
