@@ -57,6 +57,7 @@ const COMMAND: [&str; 3] = ["main.rs", "cli.rs", "text.rs"];
 /// Tests and their shapes: a file here is allowed everything, and its `mod` must be `cfg(test)`.
 const TEST_FILES: [&str; 6] = [
     "shapes.rs",
+    "io/gltf_tests.rs",
     "mesh/tests.rs",
     "mesh/modify_tests.rs",
     "decimate/tests.rs",

@@ -78,7 +78,6 @@ fn read_bytes(
         let parts = parts_of(mesh, &mut source, &mut materials, with_attributes)?;
         meshes.insert(mesh, parts);
     }
-    check_sizes(&placements, &meshes, builder)?;
     if !with_attributes || materials.groups.iter().all(is_nameless) {
         // One group of everything says nothing.
         meshes
@@ -92,6 +91,13 @@ fn read_bytes(
     } else {
         Slots::default()
     };
+    // Before anything is made room for.
+    let assets = if with_attributes {
+        assets(&source, materials.names)?
+    } else {
+        None
+    };
+    check_sizes(&placements, &meshes, builder)?;
     let mut channels: Vec<Channel> = slots.channels();
     for placement in &placements {
         place(
@@ -104,10 +110,11 @@ fn read_bytes(
     }
     if with_attributes {
         let attributes = builder.attributes();
+        let mut kinds = channels.iter().map(|channel| channel.kind);
+        attributes.v_is_down = kinds.any(|kind| kind == Kind::TextureCoordinate);
         attributes.channels = channels;
-        attributes.v_is_down = true;
         attributes.groups = materials.groups;
-        attributes.assets = assets(&source, materials.names)?;
+        attributes.assets = assets;
         attributes.notices = slots.notices;
         say_what_is_left(&document, attributes);
     }
@@ -608,12 +615,19 @@ fn push_positions(part: &Part, transform: &DAffine3, builder: &mut MeshBuilder) 
     let positions = &part.positions;
     for i in 0..positions.count {
         let [x, y, z, _] = positions.decoded(i);
-        let position = if *transform == DAffine3::IDENTITY {
-            [x, y, z]
+        let position = DVec3::new(x, y, z);
+        // Zero times infinity would be in the way where nothing is turned.
+        let turned = if transform.matrix3 == DMat3::IDENTITY {
+            position
         } else {
-            transform.transform_point3(DVec3::new(x, y, z)).to_array()
+            transform.matrix3 * position
         };
-        builder.push_double(position);
+        let moved = if transform.translation == DVec3::ZERO {
+            turned
+        } else {
+            turned + transform.translation
+        };
+        builder.push_double(moved.to_array());
     }
 }
 

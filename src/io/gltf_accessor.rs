@@ -92,7 +92,7 @@ fn read_beside(folder: Option<&Path>, uri: &str, length: usize, buffer: usize) -
     match read {
         Ok(_) => Ok(bytes),
         Err(error) => Err(wrong(
-            &format!(", which cannot be read: {error}"),
+            &format!(", which cannot be read: {}", error.kind()),
             "it beside this one",
         )),
     }

@@ -93,9 +93,7 @@ pub(super) fn cannot_carry(attributes: &Attributes) -> Vec<String> {
             let name = &component.name;
             match column {
                 None => left.push(format!("property '{name}' is not carried")),
-                Some(column)
-                    if !component.number.fits_single() || !column.keeps(component.number) =>
-                {
+                Some(_) if !component.number.fits_single() => {
                     left.push(format!("property '{name}' becomes single precision"));
                 }
                 Some(_) => {}

@@ -17,6 +17,8 @@ mod cannot_carry;
 mod gltf;
 mod gltf_accessor;
 mod gltf_document;
+#[cfg(test)]
+mod gltf_tests;
 mod gltf_write;
 mod groups;
 mod input;
