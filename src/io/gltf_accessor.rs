@@ -1,6 +1,7 @@
 //! The bytes that a glTF file names, and the numbers in them: buffers, buffer views, accessors.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -38,14 +39,22 @@ pub(super) fn load_buffers<'a>(
             // A buffer that an extension fills may have no bytes of its own.
             None => chunk.filter(|_| i == 0).map(Cow::Borrowed),
         };
-        if let Some(bytes) = &bytes
-            && bytes.len() < length
-        {
+        let Some(bytes) = bytes else {
+            buffers.push(None);
+            continue;
+        };
+        if bytes.len() < length {
             let found = format!("buffers[{i}].byteLength is {length}");
             let expected = format!("at most {}, as there are", bytes.len());
             return Err(Wrong::new(found, expected));
         }
-        buffers.push(bytes);
+        buffers.push(Some(match bytes {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[..length]),
+            Cow::Owned(mut bytes) => {
+                bytes.truncate(length);
+                Cow::Owned(bytes)
+            }
+        }));
     }
     Ok(buffers)
 }
@@ -212,6 +221,8 @@ pub(super) struct Source<'a> {
     buffers: &'a Buffers<'a>,
     /// Those that were asked for, checked.
     elements: Vec<Option<Elements<'a>>>,
+    /// Of accessors of indices the greatest, once it was looked for.
+    greatest: BTreeMap<usize, Option<u32>>,
     /// How many bytes all buffers have.
     bytes: usize,
 }
@@ -222,6 +233,7 @@ impl<'a> Source<'a> {
             document,
             buffers,
             elements: vec![None; document.accessors.len()],
+            greatest: BTreeMap::new(),
             bytes: buffers.iter().flatten().map(|bytes| bytes.len()).sum(),
         }
     }
@@ -278,6 +290,12 @@ impl<'a> Source<'a> {
                 Ok(elements)
             }
         }
+    }
+
+    /// The greatest of an accessor's indices, if it has any.
+    pub fn greatest_index(&mut self, i: usize, indices: &Elements) -> Option<u32> {
+        let find = || (0..indices.count).map(|k| indices.index(k)).max();
+        *self.greatest.entry(i).or_insert_with(find)
     }
 
     fn check(&self, i: usize) -> Answer<Elements<'a>> {

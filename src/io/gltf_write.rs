@@ -490,12 +490,11 @@ impl<'a> Layout<'a> {
             "asset".into(),
             json!({"generator": "decimate", "version": "2.0"}),
         );
-        document.insert("scene".into(), 0.into());
-        let scene = match nodes.len() {
-            0 => json!({}),
-            n => json!({"nodes": (0..n).collect::<Vec<_>>()}),
-        };
-        document.insert("scenes".into(), json!([scene]));
+        if !nodes.is_empty() {
+            let all: Vec<usize> = (0..nodes.len()).collect();
+            document.insert("scene".into(), 0.into());
+            document.insert("scenes".into(), json!([{"nodes": all}]));
+        }
         // The format has no empty lists.
         for (name, list) in [
             ("accessors", self.accessors.clone()),

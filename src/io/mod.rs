@@ -16,7 +16,10 @@ mod blocks;
 mod cannot_carry;
 mod gltf;
 mod gltf_accessor;
+mod gltf_channels;
 mod gltf_document;
+mod gltf_materials;
+mod gltf_parts;
 #[cfg(test)]
 mod gltf_tests;
 mod gltf_write;
