@@ -16,6 +16,7 @@ use super::gltf_document::{Answer, Container, Document, MAGIC, Node, Placement, 
 use super::gltf_materials::{Materials, assets, is_nameless};
 use super::gltf_parts::{Part, Slot, parts_of};
 use super::input::Input;
+use super::text::one_line;
 
 /// An extension that puts a node's mesh in several places.
 const INSTANCES: &str = "EXT_mesh_gpu_instancing";
@@ -105,6 +106,9 @@ fn read_bytes(
         attributes.assets = assets;
         attributes.notices = slots.notices;
         say_what_is_left(&document, attributes);
+        for notice in &mut attributes.notices {
+            *notice = one_line(notice);
+        }
     }
     Ok(())
 }

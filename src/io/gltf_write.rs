@@ -70,37 +70,25 @@ pub(super) fn text(writer: &mut dyn Write, mesh: &IndexedMesh) -> io::Result<()>
     writeln!(writer, "\"}}]}}")
 }
 
-/// What glTF has no place for, in short sentences.
-pub(super) fn cannot_carry(attributes: &Attributes) -> Vec<String> {
-    let mut left = Vec::new();
-    let groups = &attributes.groups;
-    if groups.iter().any(|group| !group.name.is_empty()) {
-        left.push("names of groups are not carried".into());
-    }
-    for property in &attributes.face_properties {
-        left.push(format!("face property '{}' is not carried", property.name));
-    }
-    for library in &attributes.material_libraries {
-        let what = format!("material library '{library}' is not carried, only names of materials");
-        left.push(what);
-    }
+/// The numbers of vertices that glTF has no place for, or not in their precision.
+pub(super) fn lost(attributes: &Attributes) -> Vec<String> {
+    let mut lost = Vec::new();
     let columns = columns_of(attributes);
     for channel in &attributes.channels {
         for (k, component) in channel.components.iter().enumerate() {
-            let is_column = |column: &&Column| std::ptr::eq(column.channel, channel);
-            let column = columns.iter().filter(is_column);
-            let column = column.filter(|c| c.components().contains(&k)).last();
+            let holds = |column: &Column| {
+                std::ptr::eq(column.channel, channel) && column.components().contains(&k)
+            };
             let name = &component.name;
-            match column {
-                None => left.push(format!("property '{name}' is not carried")),
-                Some(_) if !component.number.fits_single() => {
-                    left.push(format!("property '{name}' becomes single precision"));
-                }
-                Some(_) => {}
+            if !columns.iter().any(holds) {
+                lost.push(format!("vertex property '{name}'"));
+            } else if !component.number.fits_single() {
+                let what = format!("more than single precision of vertex property '{name}'");
+                lost.push(what);
             }
         }
     }
-    left
+    lost
 }
 
 /// What every row and every view of the bytes begins at a multiple of.

@@ -158,8 +158,8 @@ pub struct WriteOptions {
 /// Reads a mesh from `path`, or from standard input where `path` is `-`.
 ///
 /// Without a `format` the content decides where it is unmistakable (PLY's, OFF's and GLB's first word,
-/// the length of a binary STL, `solid` … `facet`, `{` … `"asset"`), and the extension otherwise. A file without faces
-/// is a mesh without triangles, not an error.
+/// the length of a binary STL, `solid` … `facet`, `{` … `"asset"`), and the extension otherwise. A file
+/// without faces is a mesh without triangles, not an error.
 ///
 /// # Errors
 /// [`Error::Io`] where the file cannot be read, [`Error::Parse`] where its content is not what its

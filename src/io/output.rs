@@ -5,7 +5,6 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::attributes::{Attributes, Channel};
 use crate::error::{Error, Result};
 use crate::indexed_mesh::IndexedMesh;
 
