@@ -1,6 +1,9 @@
 //! What a mesh carries beside positions: values at the corners of its faces, and what faces belong to.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
 
 use crate::error::{Error, Result};
 
@@ -28,8 +31,26 @@ pub struct Attributes {
     /// The pictures that a PLY file names (`comment TextureFile`), which its face property `texnumber`
     /// counts.
     pub textures: Vec<String>,
+    /// What a glTF file says of its materials.
+    pub assets: Option<Arc<Assets>>,
+    /// Whether the second texture coordinate grows downwards, as glTF's does; that of other formats
+    /// grows upwards, and is 1 less it.
+    pub v_is_down: bool,
     /// What the file held and is not here, in short sentences.
     pub notices: Vec<String>,
+}
+
+/// The materials of a glTF file with their textures and images, handed from reader to writer as the
+/// file has them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Assets {
+    /// The lists `materials`, `textures`, `samplers` and `images`, and the names of the extensions in
+    /// them. The `bufferView` of an image counts in [`blobs`](Self::blobs).
+    pub(crate) lists: Map<String, Value>,
+    /// What groups call each material.
+    pub(crate) material_names: Vec<String>,
+    /// The files of images that lay in the mesh's own.
+    pub(crate) blobs: Vec<Vec<u8>>,
 }
 
 /// One attribute: a few numbers a wedge.
@@ -249,6 +270,7 @@ impl Attributes {
             && self.group_of.is_empty()
             && self.material_libraries.is_empty()
             && self.textures.is_empty()
+            && self.assets.is_none()
     }
 
     /// The number of wedges.
@@ -259,9 +281,34 @@ impl Attributes {
     /// The bytes that the arrays hold.
     pub fn bytes(&self) -> usize {
         let values = self.channels.iter().map(|c| c.values.bytes());
+        let blobs = self.assets.iter().flat_map(|assets| &assets.blobs);
         self.corners.capacity() * size_of::<[u32; 3]>()
             + self.group_of.capacity() * size_of::<u32>()
             + values.sum::<usize>()
+            + blobs.map(Vec::capacity).sum::<usize>()
+    }
+
+    /// Lets the second texture coordinate grow the other way.
+    pub(crate) fn turn_v(&mut self) {
+        self.v_is_down = !self.v_is_down;
+        let is_texture = |channel: &&mut Channel| channel.kind == Kind::TextureCoordinate;
+        for channel in self.channels.iter_mut().filter(is_texture) {
+            let width = channel.width();
+            let Some(v) = channel.components.get(1) else {
+                continue;
+            };
+            let most = v.number.range().map_or(1.0, |(_, most)| most);
+            match &mut channel.values {
+                Values::Singles(list) => {
+                    let all = list.iter_mut().skip(1).step_by(width);
+                    all.for_each(|v| *v = (most - f64::from(*v)) as f32);
+                }
+                Values::Doubles(list) => {
+                    let all = list.iter_mut().skip(1).step_by(width);
+                    all.for_each(|v| *v = most - *v);
+                }
+            }
+        }
     }
 
     /// Drops what the corners and triangles say, and keeps what it was about.

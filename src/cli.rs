@@ -55,7 +55,7 @@ pub enum Command {
 /// The arguments of `decimate repair`.
 #[derive(Debug, Args)]
 pub struct RepairArgs {
-    /// The mesh to repair: PLY, OBJ, STL or OFF; - for standard input.
+    /// The mesh to repair: PLY, OBJ, STL, OFF or glTF; - for standard input.
     pub input: PathBuf,
     /// The file to write, by its extension; - for standard output. Not STL, in which faces share no
     /// vertices: a cut would be lost.
@@ -94,7 +94,7 @@ pub struct RepairArgs {
 /// The arguments of `decimate structures`.
 #[derive(Debug, Args)]
 pub struct StructuresArgs {
-    /// The mesh: PLY, OBJ, STL or OFF; - for standard input. One of quads alone is measured in the
+    /// The mesh: PLY, OBJ, STL, OFF or glTF; - for standard input. One of quads alone is measured in the
     /// structure for quads, others as triangles.
     pub mesh: PathBuf,
     /// Print JSON.
@@ -108,7 +108,7 @@ pub struct StructuresArgs {
 /// The arguments of `decimate compare`.
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// The mesh to measure against: PLY, OBJ, STL or OFF.
+    /// The mesh to measure against: PLY, OBJ, STL, OFF or glTF.
     pub reference: PathBuf,
     /// The meshes to measure.
     #[arg(required = true)]
@@ -134,7 +134,7 @@ pub struct CompareArgs {
 /// The arguments of `decimate info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// The mesh: PLY, OBJ, STL or OFF; - for standard input.
+    /// The mesh: PLY, OBJ, STL, OFF or glTF; - for standard input.
     pub mesh: PathBuf,
     /// Print JSON.
     #[arg(long)]
@@ -151,7 +151,7 @@ pub struct InfoArgs {
 /// The arguments of a decimation.
 #[derive(Debug, Args)]
 pub struct Run {
-    /// The mesh to decimate: PLY, OBJ, STL or OFF; - for standard input.
+    /// The mesh to decimate: PLY, OBJ, STL, OFF or glTF; - for standard input.
     #[arg(required = true)]
     pub input: Option<PathBuf>,
     /// The file to write, by its extension; - for standard output.

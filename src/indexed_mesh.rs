@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::attributes::Attributes;
+use crate::attributes::{Attributes, Kind};
 use crate::error::{Error, Result};
 
 /// The most triangles that three directed edges each can number with 31 bits.
@@ -202,6 +202,19 @@ impl IndexedMesh {
         attributes.check(&self.triangles)?;
         self.attributes = attributes;
         Ok(self)
+    }
+
+    /// The mesh with its second texture coordinate growing the other way, where it has one that does
+    /// not grow down, or up, as asked.
+    pub(crate) fn with_v_down(&self, v_is_down: bool) -> Option<Self> {
+        let channels = &self.attributes.channels;
+        let has_one = channels.iter().any(|c| c.kind == Kind::TextureCoordinate);
+        if !has_one || self.attributes.v_is_down == v_is_down {
+            return None;
+        }
+        let mut turned = self.clone();
+        turned.attributes.turn_v();
+        Some(turned)
     }
 
     /// The number of triangles a file of this mesh holds: double-sided ones count as two.

@@ -154,7 +154,7 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
     let output_format = io::output_format(output, &write_options)?;
     if output_format == Format::Stl {
         return Err(Error::InvalidOptions(
-            "in STL faces share no vertices, a cut would be lost; ply, obj or off is expected"
+            "in STL faces share no vertices, a cut would be lost; another format is expected"
                 .into(),
         ));
     }

@@ -256,7 +256,7 @@ fn wrong_usage_is_2_and_says_what_is_wrong() {
             "hill.ply -o out.ply --ratio 0.5 --memory-limit lots",
             "lots",
         ),
-        ("hill.ply -o out.ply --ratio 0.5 --output-format glb", "glb"),
+        ("hill.ply -o out.ply --ratio 0.5 --output-format xyz", "xyz"),
         (
             "hill.ply -o out.ply --ratio 0.5 --frobnicate",
             "--frobnicate",
@@ -503,10 +503,10 @@ fn an_error_that_is_reached_is_not_short() {
 #[test]
 fn pipes_carry_the_bytes_of_files() {
     let folder = Folder::with_hill();
-    for from in ["ply", "obj", "stl", "off"] {
+    for from in ["ply", "obj", "stl", "off", "gltf", "glb"] {
         folder.run(&format!("hill.ply -o in.{from} --ratio 1"));
         let input = folder.bytes(&format!("in.{from}"));
-        for to in ["ply", "obj", "stl", "off"] {
+        for to in ["ply", "obj", "stl", "off", "gltf", "glb"] {
             let by_file = folder.run(&format!("in.{from} -o out.{to} --ratio 0.3"));
             assert_eq!(by_file.status, 0, "{}", by_file.stderr);
             let by_pipe = folder.run_with_input(
@@ -1122,9 +1122,9 @@ fn without_welding_the_facets_of_an_stl_stay_apart() {
 #[test]
 fn every_format_becomes_every_other() {
     let folder = Folder::with_hill();
-    for from in ["ply", "obj", "stl", "off"] {
+    for from in ["ply", "obj", "stl", "off", "gltf", "glb"] {
         folder.run(&format!("hill.ply -o a.{from} --ratio 1"));
-        for to in ["ply", "obj", "stl", "off"] {
+        for to in ["ply", "obj", "stl", "off", "gltf", "glb"] {
             let report = folder.report(&format!("a.{from} -o b.{to} --ratio 1"));
             assert_eq!(report["triangles_out"], 800, "{from} to {to}");
             let info = folder.info(&format!("b.{to}"));

@@ -55,8 +55,9 @@ const ARROWS: [(&str, &[&str]); 13] = [
 const COMMAND: [&str; 3] = ["main.rs", "cli.rs", "text.rs"];
 
 /// Tests and their shapes: a file here is allowed everything, and its `mod` must be `cfg(test)`.
-const TEST_FILES: [&str; 6] = [
+const TEST_FILES: [&str; 7] = [
     "shapes.rs",
+    "io/gltf_tests.rs",
     "mesh/tests.rs",
     "mesh/modify_tests.rs",
     "decimate/tests.rs",

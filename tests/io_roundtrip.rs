@@ -7,13 +7,15 @@ use decimate::io::{self, Format, ReadOptions, WriteOptions};
 use glam::{DVec3, Vec3};
 
 /// Every way to write a mesh, with the name of the file.
-const WAYS: [(&str, Format, bool); 6] = [
+const WAYS: [(&str, Format, bool); 8] = [
     ("binary.ply", Format::Ply, false),
     ("ascii.ply", Format::Ply, true),
     ("text.obj", Format::Obj, false),
     ("binary.stl", Format::Stl, false),
     ("ascii.stl", Format::Stl, true),
     ("text.off", Format::Off, false),
+    ("text.gltf", Format::Gltf, false),
+    ("binary.glb", Format::Glb, false),
 ];
 
 fn write_and_read(mesh: &IndexedMesh, name: &str, options: &WriteOptions) -> IndexedMesh {
@@ -105,7 +107,8 @@ fn every_format_keeps_every_bit() {
     }
 }
 
-/// Vertices that no triangle uses are written too, so that numbers stay.
+/// Vertices that no triangle uses are written too, so that numbers stay; but STL and glTF have
+/// none.
 #[test]
 fn isolated_vertices_and_empty_meshes_pass() {
     let isolated = IndexedMesh::new(vec![Vec3::X, Vec3::Y, Vec3::Z], Vec::new()).unwrap();
@@ -118,7 +121,8 @@ fn isolated_vertices_and_empty_meshes_pass() {
                 ..Default::default()
             },
         );
-        let vertices = if format == Format::Stl { 0 } else { 3 };
+        let has_triangles_alone = matches!(format, Format::Stl | Format::Gltf | Format::Glb);
+        let vertices = if has_triangles_alone { 0 } else { 3 };
         assert_eq!(
             (back.positions().len(), back.triangle_count()),
             (vertices, 0),
@@ -206,15 +210,17 @@ fn the_name_need_not_tell_the_format() {
         let back = write_and_read(&mesh, "mesh.obj", &options);
         assert_eq!(corner_bits(&back), corner_bits(&mesh), "{format}");
     }
-    let error = io::write(Path::new("a.glb"), &mesh, &WriteOptions::default()).unwrap_err();
+    let error = io::write(Path::new("a.xyz"), &mesh, &WriteOptions::default()).unwrap_err();
     assert!(
-        error.to_string().contains("expected ply, obj, stl or off"),
+        error
+            .to_string()
+            .contains("expected ply, obj, stl, off, gltf or glb"),
         "{error}"
     );
     let error = io::write(Path::new("-"), &mesh, &WriteOptions::default()).unwrap_err();
     assert!(error.to_string().contains("--output-format"), "{error}");
     assert_eq!("STL".parse::<Format>().unwrap(), Format::Stl);
-    assert!("glb".parse::<Format>().is_err());
+    assert!("xyz".parse::<Format>().is_err());
 }
 
 /// `f32` numbers are written as such, not as the `f64` that they are exactly.

@@ -4,6 +4,7 @@ use crate::attributes::{Channel, Group, Kind};
 use crate::indexed_mesh::IndexedMesh;
 
 use super::Format;
+use super::gltf_write;
 use super::obj_output::ObjChannels;
 use super::ply_output::Columns;
 use super::text::one_line;
@@ -32,6 +33,14 @@ pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
             lost.extend(face_properties(mesh));
             lost.extend(some(&attributes.textures, "texture files"));
         }
+        Format::Gltf | Format::Glb => {
+            lost.extend(gltf_write::lost(attributes));
+            lost.extend(face_properties(mesh));
+            let has_name = attributes.groups.iter().any(|g| !g.name.is_empty());
+            lost.extend(has_name.then(|| "groups".to_string()));
+            lost.extend(some(&attributes.material_libraries, "material libraries"));
+            lost.extend(some(&attributes.textures, "texture files"));
+        }
         Format::Stl | Format::Off => {
             lost.extend(attributes.channels.iter().map(described));
             lost.extend(face_properties(mesh));
@@ -47,6 +56,9 @@ pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
             lost.extend(some(&attributes.material_libraries, "material libraries"));
             lost.extend(some(&attributes.textures, "texture files"));
         }
+    }
+    if !matches!(format, Format::Gltf | Format::Glb) && attributes.assets.is_some() {
+        lost.push("what materials look like".to_string());
     }
     let sentence = |what: &String| one_line(&format!("{format} has no place for {what}"));
     lost.iter().map(sentence).collect()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Place, Result};
 
 use super::text::one_line;
-use super::{Format, KNOWN_FORMATS, off, stl};
+use super::{Format, KNOWN_FORMATS, gltf, off, stl};
 
 /// How much is read at a time.
 const BLOCK_BYTES: usize = 1 << 18;
@@ -24,6 +24,8 @@ pub(super) struct Input {
     pub head: Vec<u8>,
     /// Its length in bytes, where it is known before the end.
     pub length: Option<u64>,
+    /// The folder it lies in, if it is a file that may name others.
+    pub folder: Option<PathBuf>,
 }
 
 impl Input {
@@ -39,7 +41,9 @@ impl Input {
         let file = File::open(path).map_err(cannot("cannot open"))?;
         let metadata = file.metadata().map_err(cannot("cannot open"))?;
         let length = metadata.is_file().then_some(metadata.len());
-        Self::new(path.to_path_buf(), Box::new(file), length)
+        let mut input = Self::new(path.to_path_buf(), Box::new(file), length)?;
+        input.folder = path.parent().map(Path::to_path_buf);
+        Ok(input)
     }
 
     /// Standard input.
@@ -64,6 +68,7 @@ impl Input {
             reader,
             head,
             length,
+            folder: None,
         };
         if input.head.is_empty() {
             return Err(input.error(Place::File, "the file is empty", "a mesh"));
@@ -94,6 +99,10 @@ impl Input {
             Some(Format::Stl)
         } else if off::is_off(head) {
             Some(Format::Off)
+        } else if gltf::is_binary(head) {
+            Some(Format::Glb)
+        } else if gltf::is_json(head) {
+            Some(Format::Gltf)
         } else {
             None
         }
@@ -101,17 +110,9 @@ impl Input {
 
     /// An error for what often lies where a mesh is expected and is none that we read.
     pub fn refuse_stand_ins(&self) -> Result<()> {
-        let extension = self
-            .file
-            .extension()
-            .unwrap_or_default()
-            .to_ascii_lowercase();
         if self.head.starts_with(b"version https://git-lfs") {
             let found = "this is a git-lfs pointer, not the mesh";
             return Err(self.error(Place::File, found, "the mesh itself (run `git lfs pull`)"));
-        }
-        if self.head.starts_with(b"glTF") || extension == "gltf" {
-            return Err(self.error(Place::File, "this is glTF", KNOWN_FORMATS));
         }
         Ok(())
     }

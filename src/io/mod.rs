@@ -6,6 +6,7 @@
 //! | OBJ | `v`, `vt`, `vn` and `f` lines; objects, groups and materials are one mesh | text |
 //! | STL | binary, ASCII; every facet has three vertices of its own | binary, ASCII |
 //! | OFF | OFF, COFF, NOFF, CNOFF, STOFF as text | text |
+//! | glTF 2.0 | `.gltf` with data in itself or beside, `.glb`; the triangles of a scene are one mesh | the same, in one file |
 //!
 //! Files are read in blocks, from standard input as from disk. What a header promises sizes no
 //! allocation beyond what the length of the file bears out. What a mesh carries beside positions are
@@ -14,6 +15,15 @@
 
 mod blocks;
 mod cannot_carry;
+mod gltf;
+mod gltf_accessor;
+mod gltf_channels;
+mod gltf_document;
+mod gltf_materials;
+mod gltf_parts;
+#[cfg(test)]
+mod gltf_tests;
+mod gltf_write;
 mod groups;
 mod input;
 mod obj;
@@ -54,11 +64,22 @@ pub enum Format {
     Stl,
     /// Object file format (Geomview).
     Off,
+    /// glTF 2.0 as JSON.
+    Gltf,
+    /// glTF 2.0, binary.
+    Glb,
 }
 
 impl Format {
     /// Every format, in the order in which messages list them.
-    pub const ALL: [Format; 4] = [Format::Ply, Format::Obj, Format::Stl, Format::Off];
+    pub const ALL: [Format; 6] = [
+        Format::Ply,
+        Format::Obj,
+        Format::Stl,
+        Format::Off,
+        Format::Gltf,
+        Format::Glb,
+    ];
 
     /// The usual file name extension, without the dot.
     pub fn extension(self) -> &'static str {
@@ -67,6 +88,8 @@ impl Format {
             Format::Obj => "obj",
             Format::Stl => "stl",
             Format::Off => "off",
+            Format::Gltf => "gltf",
+            Format::Glb => "glb",
         }
     }
 
@@ -96,7 +119,7 @@ impl FromStr for Format {
 }
 
 /// What messages list where a format is none of ours.
-const KNOWN_FORMATS: &str = "ply, obj, stl or off";
+const KNOWN_FORMATS: &str = "ply, obj, stl, off, gltf or glb";
 
 /// How a mesh is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -135,9 +158,9 @@ pub struct WriteOptions {
 
 /// Reads a mesh from `path`, or from standard input where `path` is `-`.
 ///
-/// Without a `format` the content decides where it is unmistakable (PLY's and OFF's first word, the
-/// length of a binary STL, `solid` … `facet`), and the extension otherwise. A file without faces
-/// is a mesh without triangles, not an error.
+/// Without a `format` the content decides where it is unmistakable (PLY's, OFF's and GLB's first word,
+/// the length of a binary STL, `solid` … `facet`, `{` … `"asset"`), and the extension otherwise. A file
+/// without faces is a mesh without triangles, not an error.
 ///
 /// # Errors
 /// [`Error::Io`] where the file cannot be read, [`Error::Parse`] where its content is not what its
@@ -222,6 +245,7 @@ fn read_into(input: Input, options: &ReadOptions, builder: &mut MeshBuilder) -> 
         Format::Obj => obj::read(input, attributes, builder),
         Format::Stl => stl::read(input, builder),
         Format::Off => off::read(input, builder),
+        Format::Gltf | Format::Glb => gltf::read(input, attributes, builder),
     }
 }
 
@@ -301,6 +325,10 @@ fn write_as(
     format: Format,
     options: &WriteOptions,
 ) -> std::io::Result<()> {
+    // What counts upwards in one format counts downwards in another.
+    let v_is_down = matches!(format, Format::Gltf | Format::Glb);
+    let turned = mesh.with_v_down(v_is_down);
+    let mesh = turned.as_ref().unwrap_or(mesh);
     match format {
         Format::Ply if options.ascii => output::ply_ascii(writer, mesh, options.precision),
         Format::Ply => output::ply_binary(writer, mesh),
@@ -308,6 +336,8 @@ fn write_as(
         Format::Stl if options.ascii => output::stl_ascii(writer, mesh, options.precision),
         Format::Stl => output::stl_binary(writer, mesh),
         Format::Off => output::off(writer, mesh, options.precision),
+        Format::Gltf => gltf_write::text(writer, mesh),
+        Format::Glb => gltf_write::binary(writer, mesh),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Writing: the file beside that takes its place when it is whole, and the formats but OBJ.
+//! Writing: the file beside that takes its place when it is whole, and the formats but OBJ and glTF.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
