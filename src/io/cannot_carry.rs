@@ -44,7 +44,8 @@ pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
         Format::Stl | Format::Off => {
             lost.extend(attributes.channels.iter().map(described));
             lost.extend(face_properties(mesh));
-            let names: [(fn(&Group) -> &String, &str); 3] = [
+            type Name = fn(&Group) -> &String;
+            let names: [(Name, &str); 3] = [
                 (|g| &g.object, "objects"),
                 (|g| &g.name, "groups"),
                 (|g| &g.material, "materials"),

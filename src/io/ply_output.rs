@@ -72,10 +72,13 @@ struct File<'a> {
     columns: Columns<'a>,
 }
 
+/// Names in the order of their numbers, and the number that each group has, if it has any.
+type Numbered<'a> = (Vec<&'a str>, Vec<Option<u32>>);
+
 /// The properties of faces.
 pub(super) struct Columns<'a> {
-    /// The names that each of [`NAMED`] numbers, and the number that each group has, if it has any.
-    names: [Option<(Vec<&'a str>, Vec<Option<u32>>)>; 3],
+    /// What each of [`NAMED`] numbers.
+    names: [Option<Numbered<'a>>; 3],
     /// Which of [`Attributes::face_properties`] are there.
     values: Vec<usize>,
     /// Whether comments are: a header can be too long to be one.

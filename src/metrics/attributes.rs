@@ -110,7 +110,11 @@ pub(super) struct Carried {
 
 impl Carried {
     /// What triangles carry whose vertices are so many.
-    pub(super) fn of(attributes: Attributes, vertices: usize, triangles: &[[u32; 3]]) -> Self {
+    pub(super) fn of(mut attributes: Attributes, vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        // Whichever way a file counts, textures are compared with v upwards.
+        if attributes.v_is_down {
+            attributes.turn_v();
+        }
         let is_texture = |channel: &Channel| channel.kind == Kind::TextureCoordinate;
         let mut charts = Vec::new();
         if attributes.channels.iter().any(is_texture) {
