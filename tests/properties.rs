@@ -7,10 +7,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use decimate::attributes::{Attributes, Channel, Group, Kind, NumberType, Property};
 use decimate::clean::clean;
 use decimate::decimate::{
-    Boundary, Chunks, Options, Placement, Quality, Report, StopReason, Targets, TierChoice,
-    Topology, decimate,
+    AttributeUse, Boundary, Chunks, Options, Placement, Quality, Report, StopReason, Targets,
+    TierChoice, Topology, decimate,
 };
 use decimate::error::Error;
 use decimate::indexed_mesh::{IndexedMesh, Parts};
@@ -340,6 +341,15 @@ fn assert_same(a: &IndexedMesh, b: &IndexedMesh, what: &str) {
     assert_eq!(a.triangles(), b.triangles(), "{what}: triangles");
     assert_eq!(a.double_sided(), b.double_sided(), "{what}: flags");
     assert_eq!(bits(a), bits(b), "{what}: positions");
+    let (a, b) = (a.attributes(), b.attributes());
+    assert_eq!(a.corners, b.corners, "{what}: wedges");
+    assert_eq!(a.group_of, b.group_of, "{what}: groups");
+    let bits = |attributes: &Attributes| -> Vec<u64> {
+        let channels = attributes.channels.iter();
+        let values = channels.flat_map(|c| (0..c.values.len()).map(|i| c.values.get(i)));
+        values.map(f64::to_bits).collect()
+    };
+    assert_eq!(bits(a), bits(b), "{what}: attributes");
 }
 
 /// Counts that a collapse may not change.
@@ -518,105 +528,216 @@ fn the_measures_know_small_complexes() {
 fn any_input_keeps_its_topology_in_every_tier() {
     for_each_case(CASES, |case| {
         let Case { mesh, options } = case_of(case);
-        let Some((output, report)) = decimated(case, &mesh, &options) else {
+        keeps_its_topology(case, &mesh, &options);
+    });
+}
+
+/// The same with attributes: normals, texture coordinates, colours and scalars that may differ at every
+/// corner and be no numbers, and groups. What is carried is as valid as what was given.
+#[test]
+fn any_attributes_are_carried_in_every_tier() {
+    for_each_case(CASES / 3, |case| {
+        let Case { mesh, options } = case_of(case);
+        let random = &mut Random::of(!case);
+        let options = Options {
+            attributes: random.pick(&[AttributeUse::Optimize, AttributeUse::Carry]),
+            ..options
+        };
+        let mesh = attributed(random, mesh);
+        let groups = mesh.attributes().groups.len();
+        let has_strange = values(&mesh).any(|x| !x.is_finite());
+        let Some(output) = keeps_its_topology(case, &mesh, &options) else {
             return;
         };
-        assert_complex(case, &output);
-        for tier in [Tier::Medium, Tier::Full] {
-            let (other, other_report) = run(&mesh, &options, tier).unwrap();
-            let what = format!("case {case}, {} against small", tier.name());
-            assert_same(&other, &output, &what);
-            let counts = |r: &Report| {
-                (
-                    [
-                        r.tally.rejected_link,
-                        r.tally.rejected_flip,
-                        r.tally.rejected_lock,
-                        r.tally.rejected_error,
-                    ],
-                    [
-                        r.tally.collapses,
-                        r.tally.collapses_non_manifold,
-                        r.triangles_out,
-                    ],
-                    r.max_error_estimate.to_bits(),
-                    (r.stop_reason, r.blocked, r.cleaning),
-                )
-            };
-            assert_eq!(counts(&other_report), counts(&report), "{what}");
-        }
-
-        let (cleaned, _) = clean(mesh.clone(), options.weld).unwrap();
-        // Without welding: an output's vertices may come to lie at one place, and stay apart.
-        let before = info(cleaned.clone(), false).unwrap();
-        let after = info(output.clone(), false).unwrap();
-        assert_eq!(
-            topology(&after),
-            topology(&before),
-            "case {case}: components, Euler characteristic, orientable"
+        let attributes = output.attributes();
+        assert_eq!(attributes.groups.len(), groups, "case {case}");
+        assert_eq!(attributes.channels.len(), mesh.attributes().channels.len());
+        assert!(
+            has_strange || values(&output).all(f64::is_finite),
+            "case {case}: an attribute is no number any more"
         );
-        assert_eq!(
-            after.cleaning.kept_faces,
-            output.triangles().len(),
-            "case {case}"
-        );
-        assert_eq!(
-            second_betti_number(&output),
-            second_betti_number(&cleaned),
-            "case {case}: enclosed volumes"
-        );
-        if before.non_manifold_edges == 0 && before.non_manifold_vertices == 0 {
-            let loops = pieces(rim_edges(&cleaned));
-            assert_eq!(pieces(rim_edges(&output)), loops, "case {case}: loops");
-            assert_eq!(after.genus, before.genus, "case {case}: genus");
-            // Without an orientation info's loops are cut where faces disagree.
-            if before.is_orientable {
-                assert_eq!(before.boundary_loops, loops, "case {case}: info's loops");
-                assert_eq!(after.boundary_loops, loops, "case {case}: info's loops");
+        for channel in attributes.channels.iter().filter(|c| c.kind == Kind::Color) {
+            for wedge in 0..channel.rows() {
+                let is_byte = |x: f64| x.fract() == 0.0 && (0.0..=255.0).contains(&x);
+                assert!(
+                    channel.row(wedge).all(is_byte),
+                    "case {case}: a colour is none"
+                );
             }
         }
-        let bad = (
-            non_manifold_vertices(&cleaned),
-            non_manifold_vertices(&output),
-        );
-        assert_eq!(
-            (before.non_manifold_vertices, after.non_manifold_vertices),
-            (bad.0.len(), bad.1.len()),
-            "case {case}: info's non-manifold vertices {bad:?}"
-        );
-        assert!(
-            after.boundary_edges <= before.boundary_edges
-                && after.non_manifold_edges <= before.non_manifold_edges
-                && bad.1.len() <= bad.0.len(),
-            "case {case}: born from {before:?}: {after:?}"
-        );
-        let crowded = (non_manifold_edges(&cleaned), non_manifold_edges(&output));
-        assert_eq!(
-            (before.non_manifold_edges, after.non_manifold_edges),
-            (crowded.0.len(), crowded.1.len()),
-            "case {case}: info's non-manifold edges {crowded:?}"
-        );
-        if before.inconsistent_edges == 0 {
-            assert_eq!(after.inconsistent_edges, 0, "case {case}");
-        }
-        assert_eq!(report.triangles_out, output.triangle_count(), "case {case}");
-        assert_eq!(
-            cleaned.positions().len() - output.positions().len(),
-            report.tally.collapses,
-            "case {case}: a vertex goes with a collapse"
-        );
-        // Above the target only with a reason.
-        assert_eq!(
-            report.triangles_out > report.target_triangles,
-            report.stop_reason != StopReason::Target,
-            "case {case}: {report:?}"
-        );
-        assert_eq!(
-            report.blocked.is_some(),
-            report.stop_reason != StopReason::Target,
-            "case {case}: {report:?}"
-        );
     });
+}
+
+/// All numbers that a mesh carries.
+fn values(mesh: &IndexedMesh) -> impl Iterator<Item = f64> {
+    let channels = mesh.attributes().channels.iter();
+    channels.flat_map(|c| (0..c.values.len()).map(|i| c.values.get(i)))
+}
+
+/// The mesh with random attributes: the same at all corners of a vertex, or one of two rows by the side
+/// of a plane that the face lies on, or anything at any corner.
+fn attributed(random: &mut Random, mesh: IndexedMesh) -> IndexedMesh {
+    let property = |name: &str, number| Property {
+        name: name.into(),
+        number,
+    };
+    let all = [
+        Channel::of_singles(Kind::Normal, &["nx", "ny", "nz"]),
+        Channel::of_singles(Kind::TextureCoordinate, &["s", "t"]),
+        Channel::new(
+            Kind::Color,
+            ["red", "green", "blue"]
+                .map(|c| property(c, NumberType::U8))
+                .into(),
+        ),
+        Channel::new(Kind::Scalar, vec![property("quality", NumberType::F64)]),
+    ];
+    let channels: Vec<Channel> = all.into_iter().filter(|_| random.one_in(2)).collect();
+    let mut attributes = Attributes {
+        channels,
+        ..Attributes::default()
+    };
+    let kind = random.below(3);
+    let strange = random.one_in(8);
+    let seed = random.below(1000);
+    for (i, triangle) in mesh.triangles().iter().enumerate() {
+        if attributes.channels.is_empty() {
+            break;
+        }
+        let first = 3 * i as u32;
+        attributes.corners.push([first, first + 1, first + 2]);
+        for (k, &v) in triangle.iter().enumerate() {
+            let of = match kind {
+                0 => v as usize,
+                1 => 2 * v as usize + usize::from(triangle.iter().sum::<u32>() % 7 < 3),
+                _ => 3 * i + k,
+            };
+            let row = &mut Random::of((1000 * of + seed) as u64);
+            for channel in &mut attributes.channels {
+                for _ in 0..channel.width() {
+                    channel.values.push(match channel.kind {
+                        Kind::Color => row.below(256) as f64,
+                        _ if strange && row.one_in(5) => {
+                            row.pick(&[f64::NAN, f64::INFINITY, 1e30, -0.0])
+                        }
+                        _ => f64::from(row.unit()),
+                    });
+                }
+            }
+        }
+    }
+    attributes.merge_equal_wedges(mesh.triangles());
+    attributes.split_shared_wedges(mesh.triangles());
+    if random.one_in(2) {
+        attributes.groups = vec![Group::default(); 3];
+        let group = |t: &[u32; 3]| t.iter().sum::<u32>() % 5 % 3;
+        attributes.group_of = mesh.triangles().iter().map(group).collect();
+    }
+    mesh.with_attributes(attributes).unwrap()
+}
+
+/// Holds what decimation makes of a mesh, in every tier, against what was promised; the output, where
+/// there is one.
+fn keeps_its_topology(case: u64, mesh: &IndexedMesh, options: &Options) -> Option<IndexedMesh> {
+    let Some((output, report)) = decimated(case, mesh, options) else {
+        return None;
+    };
+    assert_complex(case, &output);
+    for tier in [Tier::Medium, Tier::Full] {
+        let (other, other_report) = run(mesh, options, tier).unwrap();
+        let what = format!("case {case}, {} against small", tier.name());
+        assert_same(&other, &output, &what);
+        let counts = |r: &Report| {
+            (
+                [
+                    r.tally.rejected_link,
+                    r.tally.rejected_flip,
+                    r.tally.rejected_lock,
+                    r.tally.rejected_error,
+                ],
+                [
+                    r.tally.collapses,
+                    r.tally.collapses_non_manifold,
+                    r.triangles_out,
+                ],
+                r.max_error_estimate.to_bits(),
+                (r.stop_reason, r.blocked, r.cleaning),
+            )
+        };
+        assert_eq!(counts(&other_report), counts(&report), "{what}");
+    }
+
+    let (cleaned, _) = clean(mesh.clone(), options.weld).unwrap();
+    // Without welding: an output's vertices may come to lie at one place, and stay apart.
+    let before = info(cleaned.clone(), false).unwrap();
+    let after = info(output.clone(), false).unwrap();
+    assert_eq!(
+        topology(&after),
+        topology(&before),
+        "case {case}: components, Euler characteristic, orientable"
+    );
+    assert_eq!(
+        after.cleaning.kept_faces,
+        output.triangles().len(),
+        "case {case}"
+    );
+    assert_eq!(
+        second_betti_number(&output),
+        second_betti_number(&cleaned),
+        "case {case}: enclosed volumes"
+    );
+    if before.non_manifold_edges == 0 && before.non_manifold_vertices == 0 {
+        let loops = pieces(rim_edges(&cleaned));
+        assert_eq!(pieces(rim_edges(&output)), loops, "case {case}: loops");
+        assert_eq!(after.genus, before.genus, "case {case}: genus");
+        // Without an orientation info's loops are cut where faces disagree.
+        if before.is_orientable {
+            assert_eq!(before.boundary_loops, loops, "case {case}: info's loops");
+            assert_eq!(after.boundary_loops, loops, "case {case}: info's loops");
+        }
+    }
+    let bad = (
+        non_manifold_vertices(&cleaned),
+        non_manifold_vertices(&output),
+    );
+    assert_eq!(
+        (before.non_manifold_vertices, after.non_manifold_vertices),
+        (bad.0.len(), bad.1.len()),
+        "case {case}: info's non-manifold vertices {bad:?}"
+    );
+    assert!(
+        after.boundary_edges <= before.boundary_edges
+            && after.non_manifold_edges <= before.non_manifold_edges
+            && bad.1.len() <= bad.0.len(),
+        "case {case}: born from {before:?}: {after:?}"
+    );
+    let crowded = (non_manifold_edges(&cleaned), non_manifold_edges(&output));
+    assert_eq!(
+        (before.non_manifold_edges, after.non_manifold_edges),
+        (crowded.0.len(), crowded.1.len()),
+        "case {case}: info's non-manifold edges {crowded:?}"
+    );
+    if before.inconsistent_edges == 0 {
+        assert_eq!(after.inconsistent_edges, 0, "case {case}");
+    }
+    assert_eq!(report.triangles_out, output.triangle_count(), "case {case}");
+    assert_eq!(
+        cleaned.positions().len() - output.positions().len(),
+        report.tally.collapses,
+        "case {case}: a vertex goes with a collapse"
+    );
+    // Above the target only with a reason.
+    assert_eq!(
+        report.triangles_out > report.target_triangles,
+        report.stop_reason != StopReason::Target,
+        "case {case}: {report:?}"
+    );
+    assert_eq!(
+        report.blocked.is_some(),
+        report.stop_reason != StopReason::Target,
+        "case {case}: {report:?}"
+    );
+    Some(output)
 }
 
 /// Where the topology may change it becomes simpler: nothing tears, nothing becomes less manifold,
