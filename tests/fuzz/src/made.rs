@@ -1,8 +1,10 @@
 //! Triangle lists and options out of a fuzzer's bytes.
 
 use arbitrary::{Result, Unstructured};
+use decimate::attributes::{Attributes, Channel, Group, Kind};
 use decimate::decimate::{
-    Boundary, Chunks, Options, Placement, Quality, Targets, TierChoice, Topology,
+    AttributeUse, AttributeWeights, Boundary, Chunks, Options, Placement, Quality, Targets,
+    TierChoice, Topology,
 };
 use decimate::indexed_mesh::IndexedMesh;
 use glam::{DVec3, Vec3};
@@ -75,6 +77,10 @@ pub fn mesh(bytes: &mut Unstructured) -> Result<Option<IndexedMesh>> {
     let mesh = IndexedMesh::with_origin(DVec3::splat(origin), positions, triangles);
     assert_eq!(mesh.is_ok(), is_valid, "{mesh:?}");
     let Ok(mesh) = mesh else { return Ok(None) };
+    let mesh = match shape >> 6 {
+        0 => mesh,
+        kind => attributed(mesh, kind),
+    };
     if shape & 0b11_0000 != 0b11_0000 || vertices == 0 {
         return Ok(Some(mesh));
     }
@@ -82,6 +88,46 @@ pub fn mesh(bytes: &mut Unstructured) -> Result<Option<IndexedMesh>> {
     let weights = (0..vertices).map(weight).collect();
     let mesh = mesh.with_weights(weights).expect("none is negative");
     Ok(Some(mesh))
+}
+
+/// The mesh with a normal and a place in a texture at each corner, the same all around a vertex (1), or
+/// not at every third face (2), or nowhere (3), and with two groups but for the first kind.
+fn attributed(mesh: IndexedMesh, kind: u8) -> IndexedMesh {
+    let triangles = mesh.triangles();
+    let mut attributes = Attributes {
+        channels: vec![
+            Channel::of_singles(Kind::Normal, &["nx", "ny", "nz"]),
+            Channel::of_singles(Kind::TextureCoordinate, &["s", "t"]),
+        ],
+        ..Attributes::default()
+    };
+    for (i, triangle) in triangles.iter().enumerate() {
+        let first = 3 * i as u32;
+        attributes.corners.push([first, first + 1, first + 2]);
+        for (k, &v) in triangle.iter().enumerate() {
+            let of = match kind {
+                1 => v as usize,
+                2 => v as usize + 50 * usize::from(i % 3 == 0),
+                _ => 3 * i + k,
+            };
+            let number = |j: usize| match (of * 7 + j * 13) % 31 {
+                extreme @ 0..2 => f64::from(EXTREMES[extreme]),
+                other => f64::from(other as u8) / 16.0 - 1.0,
+            };
+            let mut numbers = (0..5).map(number);
+            for channel in &mut attributes.channels {
+                let row = numbers.by_ref().take(channel.width());
+                row.for_each(|x| channel.values.push(x));
+            }
+        }
+    }
+    attributes.merge_equal_wedges(triangles);
+    if kind > 1 {
+        attributes.groups = vec![Group::default(); 2];
+        attributes.group_of = (0..triangles.len() as u32).map(|i| i / 4 % 2).collect();
+    }
+    mesh.with_attributes(attributes)
+        .expect("they fit the triangles")
 }
 
 fn coordinate(bytes: &mut Unstructured) -> Result<f32> {
@@ -140,6 +186,13 @@ pub fn options(bytes: &mut Unstructured) -> Result<Options> {
         boundary: *bytes.choose(&[Boundary::Keep, Boundary::Lock, Boundary::Free])?,
         topology: *bytes.choose(&[Topology::Preserve, Topology::Preserve, Topology::Simplify])?,
         placement: *bytes.choose(&[Placement::Optimal, Placement::Endpoint])?,
+        attributes: *bytes.choose(&[
+            AttributeUse::Optimize,
+            AttributeUse::Optimize,
+            AttributeUse::Carry,
+            AttributeUse::Ignore,
+        ])?,
+        attribute_weights: AttributeWeights::default(),
         feature_angle_degrees: *bytes.choose(&[
             None,
             None,
