@@ -639,9 +639,7 @@ fn attributed(random: &mut Random, mesh: IndexedMesh) -> IndexedMesh {
 /// Holds what decimation makes of a mesh, in every tier, against what was promised; the output, where
 /// there is one.
 fn keeps_its_topology(case: u64, mesh: &IndexedMesh, options: &Options) -> Option<IndexedMesh> {
-    let Some((output, report)) = decimated(case, mesh, options) else {
-        return None;
-    };
+    let (output, report) = decimated(case, mesh, options)?;
     assert_complex(case, &output);
     for tier in [Tier::Medium, Tier::Full] {
         let (other, other_report) = run(mesh, options, tier).unwrap();

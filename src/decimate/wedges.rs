@@ -340,8 +340,8 @@ pub struct Joined {
     pub values: SmallVec<[f32; 8]>,
 }
 
-/// All wedges of the vertex that is left of an edge.
-pub type Carried = SmallVec<[Joined; 2]>;
+/// All wedges of the vertex that is left of an edge; a list that takes little room where it is empty.
+pub type Carried = Vec<Joined>;
 
 impl Wedges {
     /// Whether nothing is carried by corners.
@@ -422,7 +422,7 @@ impl Wedges {
 
     /// The wedges of the ends of an edge, those side by side that become one if it collapses: they have
     /// a corner each in a face at the edge.
-    pub fn joined_by<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> Carried {
+    pub fn joined_by<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> SmallVec<[Joined; 2]> {
         let ends = mesh.edge_vertices(e);
         let joined = |members| Joined {
             members,
@@ -433,7 +433,7 @@ impl Wedges {
             let [tail, head] = [e, mesh.next(e)].map(|corner| self.at[corner.index()]);
             return smallvec![joined(smallvec![(tail, false), (head, true)])];
         }
-        let mut classes: Carried = SmallVec::new();
+        let mut classes: SmallVec<[Joined; 2]> = SmallVec::new();
         for (v, is_head) in ends.into_iter().zip([false, true]) {
             for wedge in self.at_vertex(mesh, v) {
                 classes.push(joined(smallvec![(wedge, is_head)]));
@@ -441,7 +441,7 @@ impl Wedges {
         }
         for d in mesh.edge_star(e) {
             let corners = [d, mesh.next(d)].map(|corner| self.at[corner.index()]);
-            let class_of = |classes: &Carried, wedge: u32| {
+            let class_of = |classes: &[Joined], wedge: u32| {
                 let mut has = classes
                     .iter()
                     .map(|c| c.members.iter().any(|m| m.0 == wedge));
@@ -459,7 +459,7 @@ impl Wedges {
     }
 
     /// Lets the corners of the vertex that is left have the wedges that its ends' have become.
-    pub fn adopt<S: EdgeStore>(&mut self, mesh: &Mesh<S>, kept: VertexId, carried: &Carried) {
+    pub fn adopt<S: EdgeStore>(&mut self, mesh: &Mesh<S>, kept: VertexId, carried: &[Joined]) {
         let width = self.layout.width();
         for joined in carried {
             let row = &mut self.values[joined.members[0].0 as usize * width..][..width];
@@ -533,7 +533,12 @@ impl Wedges {
 
     /// Whether no face that stays turns over in a texture if `e` collapses.
     #[inline]
-    pub fn keeps_charts<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId, carried: &Carried) -> bool {
+    pub fn keeps_charts<S: EdgeStore>(
+        &self,
+        mesh: &Mesh<S>,
+        e: EdgeId,
+        carried: &[Joined],
+    ) -> bool {
         if self.is_empty() {
             return true;
         }
@@ -720,7 +725,7 @@ impl<S: EdgeStore> Surface<S> {
         } else {
             0.0
         };
-        let mut carried = self.wedges.joined_by(&self.mesh, e);
+        let mut carried = self.wedges.joined_by(&self.mesh, e).into_vec();
         for joined in &mut carried {
             let mean = |i: usize, is_head: bool| {
                 let at_end = joined.members.iter().filter(|m| m.1 == is_head);
