@@ -85,6 +85,13 @@ pub fn summary(input: &Path, output: &Path, report: &Report) -> String {
              face, {} are locked, {} would exceed the largest error\n",
             report.target_triangles, blocked.link, blocked.flip, blocked.lock, blocked.error
         );
+        if report.stopped_short && report.attribute_seam_edges > 0 {
+            text += &format!(
+                "attribute seams and borders of materials are kept ({} edges); --attributes carry lets \
+                 the seams go, ignore both\n",
+                report.attribute_seam_edges
+            );
+        }
     }
     text
 }

@@ -113,6 +113,7 @@ fn an_edge_in_color_and_texture_outlives_the_plane() {
         let run = |usage| decimate(two_tiles(), &keeping(0.02, quality, usage)).unwrap();
         let (kept, report) = run(AttributeUse::Optimize);
         assert!(report.triangles_out <= 64, "{quality:?}: {report:?}");
+        assert_eq!(report.attribute_seam_edges, 40);
         assert!(
             wrong_in_tiles(&kept) < 1e-5,
             "{quality:?}: {}",

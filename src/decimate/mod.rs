@@ -130,6 +130,7 @@ fn decimate_for(
         triangles_in,
         cleaning,
         reoriented_faces: 0,
+        attribute_seam_edges: 0,
         non_manifold_edges_in: 0,
         target_triangles,
         max_error: options.targets.max_error,
@@ -278,7 +279,7 @@ fn run<S: EdgeStore, C: Cost<S>>(
 
     let start = Instant::now();
     if !is_prepared {
-        surface.prepare(options, meter)?;
+        report.attribute_seam_edges = surface.prepare(options, meter)?;
     }
     let (surface, (reason, blocked)) = match original {
         None => job.collapse::<S, C>(surface, states, stop, meter)?,
@@ -356,7 +357,7 @@ fn prepared<V>(
     report.non_manifold_edges_in = surface.mesh.non_manifold_edge_count();
     report.reoriented_faces = surface.turned.iter().filter(|&&f| f).count();
     meter.work(faces)?;
-    surface.prepare(options, meter)?;
+    report.attribute_seam_edges = surface.prepare(options, meter)?;
     let flat = surface.into_flat();
     meter.work(2 * faces)?;
     Ok(flat)

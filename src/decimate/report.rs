@@ -91,6 +91,8 @@ pub struct Report {
     pub cleaning: Cleaning,
     /// Faces turned round to agree with their neighbours while decimating (undone on writing).
     pub reoriented_faces: usize,
+    /// Edges of the input that are kept as curves since attributes or groups differ across them.
+    pub attribute_seam_edges: usize,
     /// Non-manifold edges of the cleaned input.
     pub non_manifold_edges_in: usize,
     /// The number of triangles asked for; 0 where only an error was given.

@@ -106,8 +106,9 @@ impl<S: EdgeStore> Surface<S> {
         self.locked[v.index()] = true;
     }
 
-    /// Locks the boundary and marks creases, where that is asked for. Needs the whole surface.
-    pub fn prepare(&mut self, options: &Options, meter: &mut Meter) -> progress::Result<()> {
+    /// Locks the boundary and marks creases, where that is asked for, and attribute seams and borders of
+    /// groups; how many edges these have. Needs the whole surface.
+    pub fn prepare(&mut self, options: &Options, meter: &mut Meter) -> progress::Result<usize> {
         if options.boundary == Boundary::Lock {
             self.lock_boundary();
             meter.detour(self.mesh.face_slots())?;
@@ -118,14 +119,18 @@ impl<S: EdgeStore> Surface<S> {
         if options.attributes == AttributeUse::Optimize {
             self.wedges.smooth(&self.mesh);
         }
-        self.mark_attribute_seams(options.attributes);
-        meter.detour(self.mesh.face_slots())
+        let seam_edges = self.mark_attribute_seams(options.attributes);
+        meter.detour(self.mesh.face_slots())?;
+        Ok(seam_edges)
     }
 
     /// Marks the borders of groups as creases, and attribute seams unless attributes are but carried.
-    /// They may shift sideways, unless other creases are kept, too.
-    fn mark_attribute_seams(&mut self, usage: AttributeUse) {
+    /// They may shift sideways, unless other creases are kept, too. How many edges it marks.
+    fn mark_attribute_seams(&mut self, usage: AttributeUse) -> usize {
         let (mesh, wedges) = (&self.mesh, &self.wedges);
+        if wedges.is_empty() && wedges.groups.is_empty() {
+            return 0;
+        }
         let is_kept = |e: EdgeId| match usage {
             AttributeUse::Optimize => wedges.is_seam(mesh, e) || wedges.is_border(mesh, e),
             AttributeUse::Carry | AttributeUse::Ignore => wedges.is_border(mesh, e),
@@ -136,9 +141,11 @@ impl<S: EdgeStore> Surface<S> {
             let may_shift = !self.curves.are_kept();
             let mut creases = self.curves.creases().to_vec();
             creases.resize(3 * mesh.face_slots(), false);
-            kept.into_iter().for_each(|e| creases[e.index()] = true);
+            kept.iter().for_each(|e| creases[e.index()] = true);
             self.curves = Curves::of(mesh, creases, may_shift);
         }
+        // Each from both sides.
+        kept.len() / 2
     }
 
     /// Locks the vertices on boundary edges.
