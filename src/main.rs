@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
-use decimate::decimate::{decimate_with_progress, peak_rss_bytes};
+use decimate::decimate::{AttributeUse, decimate_with_progress, peak_rss_bytes};
 use decimate::error::Error;
 use decimate::io::{self, Format, ReadOptions, WriteOptions};
 use decimate::metrics::{CompareOptions, Reference, info, info_of_file};
@@ -62,7 +62,7 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     use_threads(args.threads)?;
     leave_nothing_half_written();
     check_report(args.report.as_deref(), input, output)?;
-    let options = args.options();
+    let mut options = args.options();
     options.check()?;
     let write_options = WriteOptions {
         format: args.output_format,
@@ -82,6 +82,11 @@ fn run(args: &Run) -> Result<ExitCode, Error> {
     bar.set_message("reading");
     let mesh = io::read(input, &read_options)?;
     bar.suspend(|| note(args.quiet, &mesh.attributes().notices));
+    if !output_format.carries_attributes() {
+        // What has no place in the output does not shape it either.
+        bar.suspend(|| note(args.quiet, &io::cannot_carry(&mesh, output_format)));
+        options.attributes = AttributeUse::Ignore;
+    }
     let read_seconds = start.elapsed().as_secs_f64();
 
     let (mesh, mut report) = decimate_with_progress(mesh, &options, &mut |progress| {

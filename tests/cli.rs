@@ -1566,3 +1566,41 @@ fn wrong_surface_options_are_named() {
     }
     assert!(!folder.names().contains("out.ply"));
 }
+
+/// A cube whose edges are all sharp in its normals has nothing to collapse, which is said with the way
+/// out; to a format without normals they are no hindrance.
+#[test]
+fn normals_hold_a_cube_where_they_can_be_written() {
+    let folder = Folder::with(&[]);
+    let cube: String = (0..8)
+        .map(|i| format!("v {} {} {}\n", i & 1, i >> 1 & 1, i >> 2))
+        .collect();
+    let normals = "vn 0 0 -1\nvn 0 0 1\nvn 0 -1 0\nvn 0 1 0\nvn -1 0 0\nvn 1 0 0\n";
+    let faces = [
+        "1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6",
+    ];
+    let face = |(i, corners): (usize, &str)| {
+        let corners = corners.split(' ').map(|v| format!(" {v}//{}", i + 1));
+        format!("f{}\n", corners.collect::<String>())
+    };
+    let faces: String = faces.into_iter().enumerate().map(face).collect();
+    folder.write("cube.obj", &format!("{cube}{normals}{faces}"));
+    let kept = folder.run("cube.obj -o kept.ply --triangles 6");
+    assert!(
+        kept.stderr.contains("12 -> 12 triangles"),
+        "{}",
+        kept.stderr
+    );
+    let hint = "attribute seams and borders of materials are kept (12 edges)";
+    assert!(kept.stderr.contains(hint), "{}", kept.stderr);
+    let free = folder.run("cube.obj -o free.stl --triangles 6");
+    assert!(free.stderr.contains("12 -> 6 triangles"), "{}", free.stderr);
+    let note = "note: stl has no place for normals";
+    assert!(free.stderr.contains(note), "{}", free.stderr);
+    let smeared = folder.run("cube.obj -o smeared.ply --triangles 6 --attributes carry");
+    assert!(
+        smeared.stderr.contains("12 -> 6 triangles"),
+        "{}",
+        smeared.stderr
+    );
+}

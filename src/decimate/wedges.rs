@@ -19,8 +19,9 @@ use crate::mesh::{EdgeId, EdgeStore, FaceId, Mesh, VertexId, turn_round};
 const SMOOTH_DEGREES: f64 = 30.0;
 
 /// Where normals alone part the corners at more than this share of the edges, they say nothing but the
-/// directions of the faces, and none is kept apart: else nothing could collapse.
-const FACETED: f64 = 0.5;
+/// directions of the faces, and none is kept apart: else little could collapse. Between the two halves
+/// of a box's sides they are one.
+const FACETED: f64 = 0.9;
 
 /// The wedge of no corner.
 const NONE: u32 = u32::MAX;
@@ -626,7 +627,7 @@ impl Wedges {
             };
             normals.iter().map(of_part).fold(f64::INFINITY, f64::min)
         };
-        let (mut edges, mut sharp) = (0, 0);
+        let (mut edges, mut parted) = (0, 0);
         let mut pairs: Vec<([u32; 2], f64)> = Vec::new();
         for e in mesh.faces().flat_map(FaceId::edges) {
             let Some(o) = mesh.mate(e).filter(|&o| e < o) else {
@@ -638,9 +639,9 @@ impl Wedges {
             let across = across.filter(|&pair| differ_in_normals_alone(pair));
             let begin = pairs.len();
             pairs.extend(across.map(|pair| (pair, cosine(pair))));
-            sharp += usize::from(pairs[begin..].iter().any(|pair| pair.1 < least));
+            parted += usize::from(pairs.len() > begin);
         }
-        let is_faceted = f64::from(sharp as u32) > FACETED * f64::from(edges as u32);
+        let is_faceted = f64::from(parted as u32) > FACETED * f64::from(edges as u32);
         let mut root: Vec<u32> = (0..self.count() as u32).collect();
         for ([a, b], cosine) in pairs {
             if is_faceted || cosine >= least {

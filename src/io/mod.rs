@@ -93,6 +93,11 @@ impl Format {
         }
     }
 
+    /// Whether it has room for what a mesh carries beside positions, if not for all of it.
+    pub fn carries_attributes(self) -> bool {
+        !matches!(self, Format::Stl | Format::Off)
+    }
+
     /// The format that a path's extension names, in any letter case.
     pub fn from_extension(path: &Path) -> Option<Format> {
         path.extension()?.to_str()?.parse().ok()
