@@ -341,6 +341,12 @@ pub struct Joined {
     pub values: SmallVec<[f32; 8]>,
 }
 
+impl Joined {
+    fn has(&self, wedge: u32) -> bool {
+        self.members.iter().any(|member| member.0 == wedge)
+    }
+}
+
 /// All wedges of the vertex that is left of an edge; a list that takes little room where it is empty.
 pub type Carried = Vec<Joined>;
 
@@ -387,15 +393,13 @@ impl Wedges {
     /// The wedges at a vertex.
     pub fn at_vertex<S: EdgeStore>(&self, mesh: &Mesh<S>, v: VertexId) -> SmallVec<[u32; 4]> {
         let mut wedges = SmallVec::new();
-        for start in mesh.fans(v) {
-            if !self.is_split[v.index()] {
-                return smallvec![self.at[start.index()]];
+        for e in mesh.outgoing_edges(v) {
+            let wedge = self.at[e.index()];
+            if !wedges.contains(&wedge) {
+                wedges.push(wedge);
             }
-            for e in mesh.fan(start) {
-                let wedge = self.at[e.index()];
-                if !wedges.contains(&wedge) {
-                    wedges.push(wedge);
-                }
+            if !self.is_split[v.index()] {
+                break;
             }
         }
         wedges
@@ -443,11 +447,8 @@ impl Wedges {
         for d in mesh.edge_star(e) {
             let corners = [d, mesh.next(d)].map(|corner| self.at[corner.index()]);
             let class_of = |classes: &[Joined], wedge: u32| {
-                let mut has = classes
-                    .iter()
-                    .map(|c| c.members.iter().any(|m| m.0 == wedge));
-                has.position(|has| has)
-                    .expect("every corner at an end was listed")
+                let class = classes.iter().position(|class| class.has(wedge));
+                class.expect("every corner at an end was listed")
             };
             let [a, b] = corners.map(|wedge| class_of(&classes, wedge));
             if a != b {
@@ -468,15 +469,11 @@ impl Wedges {
             self.layout.mend(row);
         }
         let wedge_of = |wedge: u32| {
-            let mut of = carried
-                .iter()
-                .filter(|c| c.members.iter().any(|m| m.0 == wedge));
-            of.next().map_or(wedge, |joined| joined.members[0].0)
+            let joined = carried.iter().find(|joined| joined.has(wedge));
+            joined.map_or(wedge, |joined| joined.members[0].0)
         };
-        for start in mesh.fans(kept) {
-            for e in mesh.fan(start) {
-                self.at[e.index()] = wedge_of(self.at[e.index()]);
-            }
+        for e in mesh.outgoing_edges(kept) {
+            self.at[e.index()] = wedge_of(self.at[e.index()]);
         }
         self.is_split[kept.index()] = carried.len() > 1;
     }
@@ -517,11 +514,9 @@ impl Wedges {
                 .extend_from_within(wedge as usize * self.layout.width()..);
             self.values
                 .truncate((copy as usize + 1) * self.layout.width());
-            for start in mesh.fans(v) {
-                for e in mesh.fan(start) {
-                    if self.at[e.index()] == wedge {
-                        self.at[e.index()] = copy;
-                    }
+            for e in mesh.outgoing_edges(v) {
+                if self.at[e.index()] == wedge {
+                    self.at[e.index()] = copy;
                 }
             }
         }
@@ -545,29 +540,25 @@ impl Wedges {
         }
         let ends = mesh.edge_vertices(e);
         let new_row = |wedge: u32| {
-            let mut of = carried
-                .iter()
-                .filter(|c| c.members.iter().any(|m| m.0 == wedge));
-            of.next().map(|joined| &joined.values[..])
+            let joined = carried.iter().find(|joined| joined.has(wedge));
+            joined.map(|joined| &joined.values[..])
         };
         self.layout
             .parts_of(Kind::TextureCoordinate)
             .filter(|part| part.len() > 1)
             .all(|part| {
                 ends.iter().zip([ends[1], ends[0]]).all(|(&v, other)| {
-                    mesh.fans(v)
-                        .flat_map(|start| mesh.fan(start))
-                        .all(|corner| {
-                            let (next, prev) = (mesh.next(corner), mesh.prev(corner));
-                            if mesh.head(corner) == other || mesh.tail(prev) == other {
-                                return true;
-                            }
-                            let [a, b, c] = self.places([corner, next, prev], &part);
-                            let new = new_row(self.at[corner.index()]);
-                            let moved = new.map_or(a, |row| place(row, &part));
-                            let (before, after) = (signed_area(a, b, c), signed_area(moved, b, c));
-                            before == 0.0 || before * after > 0.0
-                        })
+                    mesh.outgoing_edges(v).all(|corner| {
+                        let (next, prev) = (mesh.next(corner), mesh.prev(corner));
+                        if mesh.head(corner) == other || mesh.tail(prev) == other {
+                            return true;
+                        }
+                        let [a, b, c] = self.places([corner, next, prev], &part);
+                        let new = new_row(self.at[corner.index()]);
+                        let moved = new.map_or(a, |row| place(row, &part));
+                        let (before, after) = (signed_area(a, b, c), signed_area(moved, b, c));
+                        before == 0.0 || before * after > 0.0
+                    })
                 })
             })
     }

@@ -9,7 +9,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::form::{Form, Matrix};
+use super::form::{Form, Matrix, times};
 use crate::decimate::options::{AttributeUse, Placement};
 use crate::decimate::surface::Surface;
 use crate::decimate::wedges::{Carried, Joined};
@@ -121,7 +121,7 @@ impl AttributeForms {
             for wedge in surface.wedges.at_vertex(mesh, v) {
                 self.rows[wedge as usize * self.stride..][..self.stride].fill(0.0);
             }
-            for corner in mesh.fans(v).flat_map(|start| mesh.fan(start)) {
+            for corner in mesh.outgoing_edges(v) {
                 if let Some(gradients) = Gradients::of(surface, corner) {
                     self.add(surface, &gradients, corner);
                 }
@@ -145,22 +145,14 @@ impl AttributeForms {
                     *sum += number;
                 }
                 if is_head {
-                    let [xx, xy, xz, yy, yz, zz] = spread;
-                    let [x, y, z] = form.along;
-                    let across = DVec3::new(
-                        xx * x + xy * y + xz * z,
-                        xy * x + yy * y + yz * z,
-                        xz * x + yz * y + zz * z,
-                    );
+                    let across = DVec3::from(times(&spread, &form.along));
                     b += across;
                     form.at_tail += along.dot(across);
                 }
             }
-            for (i, &factor) in surface.wedges.layout.factors.iter().enumerate() {
-                let Some(mean) = self
-                    .mean(surface, &joined, i, along)
-                    .filter(|_| factor > 0.0)
-                else {
+            let factors = surface.wedges.layout.factors.iter().enumerate();
+            for (i, &factor) in factors.filter(|(_, factor)| **factor > 0.0) {
+                let Some(mean) = self.mean(surface, &joined, i, along) else {
                     continue;
                 };
                 let Mean {
