@@ -595,37 +595,35 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
         }
     }
 
-    /// The vertices that are so many edges away from the seam, or as many as there are.
+    /// The vertices that are more than so many edges away from the seam, or as many as there are.
     fn deep(&self, rings: usize) -> Vec<VertexId> {
         let surface = self.greedy.surface();
-        let mut distance: Vec<Option<usize>> = vec![None; surface.mesh.vertex_slots()];
-        let mut reached: Vec<VertexId> = Vec::with_capacity(distance.len());
-        reached.extend(surface.mesh.vertices().filter(|&v| surface.is_on_seam(v)));
-        for v in &reached {
-            distance[v.index()] = Some(0);
-        }
-        let mut done = 0;
-        while let Some(&v) = reached.get(done) {
-            done += 1;
-            let next = distance[v.index()].map(|d| d + 1);
-            for x in surface.mesh.neighbours(v) {
-                if distance[x.index()].is_none() {
-                    distance[x.index()] = next;
-                    reached.push(x);
+        let mesh = &surface.mesh;
+        let mut is_near: Vec<bool> = (0..mesh.vertex_slots())
+            .map(|v| surface.is_on_seam(VertexId::new(v)))
+            .collect();
+        let mut last: Vec<VertexId> = Vec::new();
+        let mut next: Vec<VertexId> = mesh.vertices().filter(|v| is_near[v.index()]).collect();
+        for _ in 0..rings {
+            if next.is_empty() {
+                break;
+            }
+            last.clear();
+            for x in next.iter().flat_map(|&v| mesh.neighbours(v)) {
+                if !std::mem::replace(&mut is_near[x.index()], true) {
+                    last.push(x);
                 }
             }
+            std::mem::swap(&mut last, &mut next);
         }
-        // What no seam borders on is deep.
-        let is_deep = |v: &VertexId, rings| distance[v.index()].is_none_or(|d| d > rings);
-        let deepest = reached
-            .last()
-            .map_or(0, |v| distance[v.index()].unwrap_or(0));
-        let rings = rings.min(deepest.saturating_sub(1));
-        surface
-            .mesh
-            .vertices()
-            .filter(|v| is_deep(v, rings))
-            .collect()
+        // Where none is farther away, the last ring is deep.
+        let deepest = if next.is_empty() { &last } else { &next };
+        let mut beyond = deepest.iter().flat_map(|&v| mesh.neighbours(v));
+        if beyond.all(|x| is_near[x.index()]) {
+            let deepest = deepest.iter().filter(|&&v| !surface.is_on_seam(v));
+            deepest.for_each(|v| is_near[v.index()] = false);
+        }
+        mesh.vertices().filter(|v| !is_near[v.index()]).collect()
     }
 
     /// How many of these vertices are left.

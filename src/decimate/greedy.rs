@@ -130,29 +130,31 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             tally,
         };
         greedy.tally.rejected_lock += greedy.locked_edges();
-        greedy.queue_all(|_, _| true, meter)?;
+        greedy.queue_all(false, meter)?;
         Ok(greedy)
     }
 
-    /// Queues every edge that `choose` takes; evaluated in parallel where they are many. Whether there
-    /// is one.
-    fn queue_all(
-        &mut self,
-        choose: impl Fn(&Self, &Candidate) -> bool + Sync,
-        meter: &mut Meter,
-    ) -> progress::Result<bool> {
+    /// Queues every edge, or only those that can be collapsed now; evaluated in parallel where they are
+    /// many. Whether there is one.
+    fn queue_all(&mut self, only_possible: bool, meter: &mut Meter) -> progress::Result<bool> {
         let slots = self.surface.mesh.face_slots();
         let evaluate = |greedy: &Self, first: usize, found: &mut Vec<Candidate>| {
             let mesh = &greedy.surface.mesh;
-            let slots = first..slots.min(first + PART_FACES);
-            let faces = slots.map(FaceId::new).filter(|&f| mesh.is_live_face(f));
-            let names = faces.flat_map(FaceId::edges);
-            let names = names.filter(|&e| mesh.canonical(e) == e);
-            greedy.evaluate_all(names, |c| {
-                if choose(greedy, &c) {
-                    found.push(c);
+            let mut names = Vec::with_capacity(3 * PART_FACES);
+            for f in (first..slots.min(first + PART_FACES)).map(FaceId::new) {
+                if !mesh.is_live_face(f) {
+                    continue;
                 }
-            });
+                for e in f.edges() {
+                    if mesh.canonical(e) == e {
+                        names.push(e);
+                    }
+                }
+            }
+            greedy.evaluate_all(&names, found);
+            if only_possible {
+                found.retain(|c| greedy.is_possible(c.edge));
+            }
         };
         let mut is_any = false;
         let mut queue = |queue: &mut Q, found: &mut Vec<Candidate>| {
@@ -279,10 +281,10 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                     let faces = self.surface.mesh.face_count();
                     let faces_before = faces + merged.collapse.dead_faces.len();
                     if faces < exact_below && faces_before >= exact_below {
-                        self.queue_all(|_, _| true, meter)?;
+                        self.queue_all(false, meter)?;
                     } else {
                         if C::IS_LAZY {
-                            self.complete(&merged, candidate.cost);
+                            self.complete(&merged, &plan.way, candidate.cost);
                         }
                         self.reconsider();
                     }
@@ -341,9 +343,8 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         let mut pending = std::mem::take(&mut self.pending);
         let mut found = std::mem::take(&mut self.found);
         // Some may have gone since.
-        let is_live = |e: &EdgeId| self.surface.mesh.is_live_face(e.face());
-        let pending_now = pending.iter().copied().filter(is_live);
-        self.evaluate_all(pending_now, |candidate| found.push(candidate));
+        pending.retain(|e| self.surface.mesh.is_live_face(e.face()));
+        self.evaluate_all(&pending, &mut found);
         for candidate in found.drain(..) {
             self.queue.push(candidate, Age::UpToDate);
         }
@@ -355,20 +356,29 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     /// cost of now, which is a lower bound. At a busy one that stayed only of the edges that it gained:
     /// what the others cost more now they say when they are popped.
     #[inline]
-    fn complete(&mut self, merged: &Merged, cost: f32) {
+    fn complete(&mut self, merged: &Merged, way: &Way, cost: f32) {
         let mut edges = std::mem::take(&mut self.edges);
         let (mesh, queue) = (&self.surface.mesh, &mut self.queue);
+        let mut outdate = |e| {
+            if let Some(name) = outdated(mesh, queue, e) {
+                edges.push(name);
+            }
+        };
         if let Some(gained) = &merged.gained {
-            edges.extend(gained.iter().filter_map(|&e| outdated(mesh, queue, e)));
+            gained.iter().copied().for_each(outdate);
+        } else if let Way::Collapse(Some(disks)) = way {
+            for of_end in disks.spokes() {
+                of_end.iter().copied().for_each(&mut outdate);
+            }
         } else {
             for start in mesh.fans(merged.collapse.kept) {
                 let mut end = None;
                 for e in mesh.fan(start) {
-                    edges.extend(outdated(mesh, queue, e));
+                    outdate(e);
                     end = Some(mesh.prev(e));
                 }
                 let end = end.filter(|&end| mesh.mate(end).is_none());
-                edges.extend(end.and_then(|end| outdated(mesh, queue, end)));
+                end.into_iter().for_each(&mut outdate);
             }
         }
         for edge in edges.drain(..) {
@@ -404,23 +414,20 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.cost.evaluate(&self.surface, e, self.surface.held(e))
     }
 
-    /// Gives the candidates of edges, in any order.
-    #[inline(always)]
-    fn evaluate_all(
-        &self,
-        edges: impl IntoIterator<Item = EdgeId>,
-        mut give: impl FnMut(Candidate),
-    ) {
+    /// Adds the candidates of edges to those found, in any order.
+    #[inline]
+    fn evaluate_all(&self, edges: &[EdgeId], found: &mut Vec<Candidate>) {
+        let may_fill = self.may_simplify();
         let mut give = |edge: EdgeId, cost: f32| {
-            let price = self.fill_price(edge).map(|price| price as f32);
-            let cost = price.map_or(cost, |price| price.min(cost));
+            let price = may_fill.then(|| self.fill_price(edge)).flatten();
+            let cost = price.map_or(cost, |price| (price as f32).min(cost));
             if cost.is_finite() {
-                give(Candidate { cost, edge });
+                found.push(Candidate { cost, edge });
             }
         };
         let mut batch = [EdgeId::new(0); LANES];
         let mut count = 0;
-        edges.into_iter().for_each(|e| {
+        for &e in edges {
             match self.surface.held(e) {
                 [false, false] => {
                     batch[count] = e;
@@ -440,7 +447,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 (0..LANES).for_each(|i| give(batch[i], costs[i]));
                 count = 0;
             }
-        });
+        }
         if count > 0 {
             let first = batch[0];
             batch[count..].fill(first);
@@ -653,9 +660,9 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             self.free_vertices.push(merged.collapse.removed);
             for e in std::mem::take(&mut self.waiting) {
                 if self.surface.mesh.is_live_face(e.face()) {
-                    let mut found = None;
+                    let mut found = Vec::new();
                     let name = self.surface.mesh.canonical(e);
-                    self.evaluate_all([name], |c| found = Some(c));
+                    self.evaluate_all(&[name], &mut found);
                     found
                         .into_iter()
                         .for_each(|c| self.queue.push(c, Age::UpToDate));
@@ -695,7 +702,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             }
         }
         let mut found = std::mem::take(&mut self.found);
-        self.evaluate_all(edges.iter().copied(), |candidate| found.push(candidate));
+        self.evaluate_all(&edges, &mut found);
         found
             .drain(..)
             .for_each(|candidate| self.queue.push(candidate, Age::UpToDate));
@@ -715,12 +722,13 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     /// Puts what can be collapsed after all back into the queue: what was refused once and has not
     /// been evaluated since, because no cost around it changed. Whether there is anything.
     fn revive(&mut self, meter: &mut Meter) -> progress::Result<bool> {
-        let is_possible = |greedy: &Self, c: &Candidate| {
-            greedy
-                .evaluate(c.edge)
-                .is_some_and(|e| greedy.way(c.edge, None, e.position).is_ok())
-        };
-        self.queue_all(is_possible, meter)
+        self.queue_all(true, meter)
+    }
+
+    /// Whether an edge can be collapsed as things are.
+    fn is_possible(&self, e: EdgeId) -> bool {
+        let evaluation = self.evaluate(e);
+        evaluation.is_some_and(|evaluation| self.way(e, None, evaluation.position).is_ok())
     }
 
     /// Why nothing is left to collapse: the reason of every edge that is left.

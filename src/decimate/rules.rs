@@ -112,9 +112,9 @@ struct Faces {
     point: Vec3,
     offset: Vec3,
     scale: f32,
-    /// The coordinates of the vertices on the rim; and 1 where the vertex is the edge's other end, so
-    /// that the faces there go, else 0.
-    rim: [[f32; GATHERED + LANES]; 4],
+    /// The coordinates of each vertex on the rim; and 1 where it is the edge's other end, so that the
+    /// faces there go, else 0. Stored and loaded whole, or a load would wait for four stores.
+    rim: [[f32; 4]; GATHERED + LANES],
     count: usize,
     /// The largest squared distance from their planes so far, in each lane.
     squared: f32x4,
@@ -127,7 +127,7 @@ impl Faces {
             point: Vec3::ZERO,
             offset: Vec3::ZERO,
             scale: geometry.scale() as f32,
-            rim: [[0.0; GATHERED + LANES]; 4],
+            rim: [[0.0; 4]; GATHERED + LANES],
             count: 0,
             squared: f32x4::ZERO,
         }
@@ -135,11 +135,8 @@ impl Faces {
 
     #[inline(always)]
     fn put(&mut self, i: usize, position: Vec3, is_other: bool) {
-        let i = i.min(GATHERED);
-        self.rim[0][i] = position.x;
-        self.rim[1][i] = position.y;
-        self.rim[2][i] = position.z;
-        self.rim[3][i] = if is_other { 1.0 } else { 0.0 };
+        let mark = if is_other { 1.0 } else { 0.0 };
+        self.rim[i.min(GATHERED)] = [position.x, position.y, position.z, mark];
     }
 
     /// A fan around a vertex at `point` that moves by `offset`, and the first vertex on its rim.
@@ -154,9 +151,7 @@ impl Faces {
     fn add(&mut self, position: Vec3, is_other: bool) -> Option<()> {
         if self.count == GATHERED {
             self.look()?;
-            for numbers in &mut self.rim {
-                numbers[0] = numbers[GATHERED];
-            }
+            self.rim[0] = self.rim[GATHERED];
             self.count = 0;
         }
         self.count += 1;
@@ -168,9 +163,10 @@ impl Faces {
     #[inline(always)]
     fn vertices(&self, first: usize) -> [f32x4; 4] {
         let [x, y, z] = self.point.to_array();
-        let four = |k: usize| f32x4::new(*self.rim[k][first..].first_chunk().expect("as many"));
-        let from = |k, origin| (four(k) - f32x4::splat(origin)) * f32x4::splat(self.scale);
-        [from(0, x), from(1, y), from(2, z), four(3)]
+        let four: &[_; LANES] = self.rim[first..].first_chunk().expect("as many");
+        let [a, b, c, marks] = f32x4::transpose(four.map(f32x4::new));
+        let from = |four, origin| (four - f32x4::splat(origin)) * f32x4::splat(self.scale);
+        [from(a, x), from(b, y), from(c, z), marks]
     }
 
     /// The largest distance from the planes of those looked at.
@@ -181,15 +177,12 @@ impl Faces {
     }
 
     /// Looks at the faces gathered. Nothing where one turns.
-    #[inline]
+    #[inline(always)]
     fn look(&mut self) -> Option<()> {
         // The lanes behind the last face hold faces that go.
         let last = self.count.min(GATHERED);
-        for numbers in &mut self.rim[..3] {
-            let number = numbers[last];
-            numbers[last + 1..last + LANES].fill(number);
-        }
-        self.rim[3][last + 1..last + LANES].fill(1.0);
+        let [x, y, z, _] = self.rim[last];
+        self.rim[last + 1..last + LANES].fill([x, y, z, 1.0]);
         for first in (0..last).step_by(LANES) {
             let (from, to) = (self.vertices(first), self.vertices(first + 1));
             let squared = distance_squared(&from, &to, self.offset)?;
@@ -223,6 +216,7 @@ fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<
     let turns = dot(&normal, &after).simd_le(f32x4::ZERO)
         | is_thin(dot(&after, &after), &a_after, &b_after);
     let stays = (a_is_other + b_is_other).simd_eq(f32x4::ZERO);
-    let had_shape = !is_thin(area_squared, &a, &b);
-    (!(turns & stays & had_shape).any()).then_some(squared)
+    let turns = turns & stays;
+    let is_turned = turns.any() && (turns & !is_thin(area_squared, &a, &b)).any();
+    (!is_turned).then_some(squared)
 }

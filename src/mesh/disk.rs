@@ -52,6 +52,13 @@ impl Disks {
         [self.around[0][0], self.around[1][0]]
     }
 
+    /// The edges that leave the vertex that a [collapse](Mesh::collapse_between) leaves, in the order of
+    /// its fan: those of the tail, then those of the head.
+    #[inline(always)]
+    pub fn spokes(&self) -> [&[EdgeId]; 2] {
+        [0, 1].map(|end| &self.leaving[end][..self.counts[end].min(FEW)])
+    }
+
     /// The [link condition](Mesh::link_condition).
     #[inline(always)]
     pub fn link_condition(&self) -> bool {
