@@ -62,8 +62,9 @@ pub struct RepairArgs {
     #[arg(short, long)]
     pub output: PathBuf,
     /// Cut along edges of three faces or more and at vertices whose faces are not one fan, with few
-    /// copies of vertices; positions and faces stay as they are, attributes where the output is OBJ.
-    /// Decimating the output needs --no-weld, or the copies become one again.
+    /// copies of vertices; positions and faces stay as they are, and so do attributes, but those for
+    /// which the output's format would have copies of vertices (OBJ has next to none). Decimating the
+    /// output needs --no-weld, or the copies become one again.
     #[arg(long)]
     pub cut: bool,
     /// Keep vertices at equal positions apart (they are welded otherwise, unless that alone would

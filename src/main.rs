@@ -166,14 +166,15 @@ fn run_repair(args: &RepairArgs) -> Result<ExitCode, Error> {
     io::check_place(output)?;
     let read_options = ReadOptions {
         format: args.input_format,
-        // Elsewhere vertices would stand once for each of their wedges, as if they were cut.
-        attributes: output_format == Format::Obj,
+        attributes: output_format.carries_attributes(),
         ..ReadOptions::default()
     };
     let mesh = io::read(input, &read_options)?;
     note(args.quiet, &mesh.attributes().notices);
     let (mesh, report) =
         repair::cut(mesh, !args.no_weld).map_err(|error| name_mesh(error, input))?;
+    let (mesh, lost) = io::without_copies(mesh, output_format);
+    note(args.quiet, &lost);
     note(args.quiet, &io::cannot_carry(&mesh, output_format));
     io::write(output, &mesh, &write_options)?;
     if let Some(path) = &args.report {

@@ -7,6 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use decimate::attributes::Kind;
 use decimate::decimate::{Quality, needed_bytes};
 use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{self, ReadOptions, WriteOptions};
@@ -1252,6 +1253,61 @@ fn repair_cuts_what_is_not_manifold() {
             };
             assert_eq!(corners(&after), corners(&before));
         }
+    }
+}
+
+/// What a cut mesh carries is written wherever it takes no copies of vertices, and named where it would.
+#[test]
+fn repair_keeps_what_takes_no_copies_of_vertices() {
+    let folder = Folder::with(&[]);
+    // Two triangles that share a vertex and nothing else, each in a group of its own; texture
+    // coordinates have a seam there, normals have none.
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\n\
+               vt 0 0\nvt 1 0\nvt 0 1\nvt 0.5 0.5\nvn 0 0 1\n\
+               g a\nf 1/1/1 2/2/1 3/3/1\ng b\nf 1/4/1 4/2/1 5/3/1\n";
+    // A third across an edge, so that one edge is of three faces and the seam lies beside the cut.
+    let obj = format!("{obj}v 0 0 1\ng a\nf 1/1/1 2/2/1 6/3/1\ng b\nf 2/2/1 1/1/1 5/3/1\n");
+    fs::write(folder.0.path().join("in.obj"), obj).unwrap();
+    let carried = |name: &str| {
+        let mesh = folder.mesh(name);
+        let kinds: Vec<Kind> = mesh.attributes().channels.iter().map(|c| c.kind).collect();
+        (
+            mesh.positions().len(),
+            kinds,
+            mesh.attributes().groups.len(),
+        )
+    };
+    let all = vec![Kind::TextureCoordinate, Kind::Normal];
+    for (output, kinds, groups, note) in [
+        ("out.obj", &all, 2, ""),
+        ("out.ply", &all, 2, ""),
+        (
+            "out.glb",
+            &vec![Kind::Normal],
+            1,
+            "copies of vertices for texture",
+        ),
+        ("out.off", &vec![], 0, ""),
+    ] {
+        let ran = folder.run(&format!("repair in.obj -o {output} --cut"));
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        assert!(ran.stderr.contains(note), "{output}: {}", ran.stderr);
+        assert_eq!(
+            ran.stderr.contains("copies of vertices"),
+            !note.is_empty(),
+            "{}",
+            ran.stderr
+        );
+        let (vertices, found, found_groups) = carried(output);
+        let vertices_out =
+            folder.report("repair in.obj -o again.obj --cut")["vertices_out"].clone();
+        assert_eq!(vertices_out, vertices, "{output}");
+        let has_all = kinds.iter().all(|kind| found.contains(kind));
+        assert!(has_all && found.len() == kinds.len(), "{output}: {found:?}");
+        assert!(
+            found_groups.max(1) == groups.max(1),
+            "{output}: {found_groups} groups"
+        );
     }
 }
 

@@ -6,8 +6,9 @@ use crate::indexed_mesh::IndexedMesh;
 use super::Format;
 use super::gltf_write;
 use super::obj_output::ObjChannels;
-use super::ply_output::Columns;
+use super::ply_output::{Columns, listed};
 use super::text::one_line;
+use super::wedges::has_seam;
 
 /// What a file of `format` will not have of a mesh, in short sentences.
 pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
@@ -63,6 +64,57 @@ pub fn cannot_carry(mesh: &IndexedMesh, format: Format) -> Vec<String> {
     }
     let sentence = |what: &String| one_line(&format!("{format} has no place for {what}"));
     lost.iter().map(sentence).collect()
+}
+
+/// The mesh without what a file of `format` could have but with copies of vertices, as if it were cut
+/// there; and what that is, in short sentences.
+pub fn without_copies(mesh: IndexedMesh, format: Format) -> (IndexedMesh, Vec<String>) {
+    let attributes = mesh.attributes();
+    let list = (format == Format::Ply).then(|| listed(&mesh)).flatten();
+    let of_obj = ObjChannels::of(attributes);
+    let needs_copies = |i: usize, channel: &Channel| {
+        let is_by_vertex = match format {
+            Format::Ply => list != Some(i),
+            Format::Obj => of_obj.colors.is_some_and(|c| std::ptr::eq(c, channel)),
+            Format::Gltf | Format::Glb => true,
+            Format::Stl | Format::Off => false,
+        };
+        is_by_vertex && has_seam(&mesh, channel)
+    };
+    let channels = attributes.channels.iter().enumerate();
+    let is_lost: Vec<bool> = channels.map(|(i, c)| needs_copies(i, c)).collect();
+    // A part of a glTF file has vertices of its own.
+    let loses_groups = matches!(format, Format::Gltf | Format::Glb) && attributes.groups.len() > 1;
+    let mut lost: Vec<String> = Vec::new();
+    for (channel, _) in attributes
+        .channels
+        .iter()
+        .zip(&is_lost)
+        .filter(|(_, lost)| **lost)
+    {
+        lost.push(described(channel));
+    }
+    lost.extend(loses_groups.then(|| "groups and materials".to_string()));
+    let mut parts = mesh.into_parts();
+    let attributes = &mut parts.attributes;
+    let mut flags = is_lost.iter();
+    attributes.channels.retain(|_| flags.next() == Some(&false));
+    if attributes.channels.is_empty() {
+        attributes.corners = Vec::new();
+    }
+    if loses_groups {
+        attributes.groups = Vec::new();
+        attributes.group_of = Vec::new();
+        attributes.assets = None;
+    }
+    attributes.merge_equal_wedges(&parts.triangles);
+    let sentence = |what: &String| {
+        one_line(&format!(
+            "{format} would have copies of vertices for {what}"
+        ))
+    };
+    let lost = lost.iter().map(sentence).collect();
+    (IndexedMesh::from_valid(parts), lost)
 }
 
 fn described(channel: &Channel) -> String {

@@ -11,7 +11,8 @@
 //! Files are read in blocks, from standard input as from disk. What a header promises sizes no
 //! allocation beyond what the length of the file bears out. What a mesh carries beside positions are
 //! its [attributes](IndexedMesh::attributes): what of a file is left behind is said there, and
-//! [`cannot_carry`] says what a format has no place for.
+//! [`cannot_carry`] says what a format has no place for, and [`without_copies`] what it has but at the
+//! price of vertices that stand there several times.
 
 mod blocks;
 mod cannot_carry;
@@ -47,7 +48,7 @@ use std::str::FromStr;
 use crate::error::{Error, Place, Result};
 use crate::indexed_mesh::{IndexedMesh, MeshBuilder, PolygonMesh};
 
-pub use cannot_carry::cannot_carry;
+pub use cannot_carry::{cannot_carry, without_copies};
 pub use output::{Abandoned, abandon_unfinished, check_place, write_file};
 
 use input::Input;

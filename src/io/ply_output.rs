@@ -53,7 +53,7 @@ pub(super) type Digits = Option<usize>;
 
 /// The channel that is a list of faces: texture coordinates that were one, or else the first that cannot
 /// be of vertices.
-fn listed(mesh: &IndexedMesh) -> Option<usize> {
+pub(super) fn listed(mesh: &IndexedMesh) -> Option<usize> {
     let channels = &mesh.attributes().channels;
     let find = |is_it: &dyn Fn(&Channel) -> bool| {
         let is_it = |c: &Channel| c.kind == Kind::TextureCoordinate && is_it(c);
