@@ -214,8 +214,8 @@ pub struct Run {
     #[arg(long, value_enum, default_value_t, help_heading = "Surface")]
     pub attributes: AttributesArg,
     /// How much an attribute weighs against positions: normal, color, texture or scalar, and a share
-    /// of the mesh's diagonal that weighs as much as a change by all of the attribute's range. May be
-    /// given several times.
+    /// of the mesh's diagonal that weighs as much as a change by all of the attribute's range (what
+    /// suits the number of triangles where not given). May be given several times.
     #[arg(long, value_name = "KIND=WEIGHT", value_parser = parse_weight, help_heading = "Surface")]
     pub weight: Vec<(WeightKind, f64)>,
     /// Keep vertices at equal positions apart (they are welded otherwise).
@@ -368,7 +368,7 @@ impl Run {
                 WeightKind::Color => &mut weights.color,
                 WeightKind::Texture => &mut weights.texture,
                 WeightKind::Scalar => &mut weights.scalar,
-            } = weight;
+            } = Some(weight);
         }
         weights
     }

@@ -204,7 +204,12 @@ fn run<S: EdgeStore, C: Cost<S>>(
     let is_carried = report.target_triangles < triangles_start;
     if is_carried {
         let geometry = (&flat.positions[..], &flat.triangles[..]);
-        flat.wedges = FlatWedges::of(&attributes, geometry, scale, options);
+        // Where an error alone is asked for, nobody knows.
+        let left = match report.target_triangles {
+            0 => triangles_start / 10,
+            target => target,
+        };
+        flat.wedges = FlatWedges::of(&attributes, geometry, scale, left, options);
         attributes.forget_values();
     }
     // Single precision has no room for the scale of a tiny mesh, and takes a larger one exactly.

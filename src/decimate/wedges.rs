@@ -51,8 +51,9 @@ impl Layout {
     }
 
     /// The layout of a mesh's attributes. `texture_scale` is the length on the surface, in the unit
-    /// box, of a unit of each texture coordinate channel, in their order.
-    fn of(attributes: &Attributes, options: &Options, texture_scale: &[f64]) -> Self {
+    /// box, of a unit of each texture coordinate channel, in their order; `left` is how many triangles are
+    /// to be.
+    fn of(attributes: &Attributes, options: &Options, left: usize, texture_scale: &[f64]) -> Self {
         let mut layout = Self {
             usage: options.attributes,
             ..Self::default()
@@ -66,7 +67,7 @@ impl Layout {
                 Kind::TextureCoordinate => 1.0 / texture_scale.next().copied().unwrap_or(0.0),
                 Kind::Scalar => span(channel),
             };
-            let factor = options.attribute_weights.of(channel.kind) / unit;
+            let factor = options.attribute_weights.of(channel.kind, left) / unit;
             let factor = if factor.is_finite() {
                 factor * factor
             } else {
@@ -135,11 +136,13 @@ pub struct FlatWedges {
 }
 
 impl FlatWedges {
-    /// The attributes of a mesh with these positions, brought into the unit box by `scale`.
+    /// The attributes of a mesh with these positions, brought into the unit box by `scale`, of which so
+    /// many triangles are to be `left`.
     pub fn of(
         attributes: &Attributes,
         (positions, triangles): (&[Vec3], &[[u32; 3]]),
         scale: f64,
+        left: usize,
         options: &Options,
     ) -> Self {
         if options.attributes == AttributeUse::Ignore {
@@ -152,7 +155,7 @@ impl FlatWedges {
                 texture_scale(channel, &attributes.corners, positions, triangles) * scale
             })
             .collect();
-        let layout = Layout::of(attributes, options, &scales);
+        let layout = Layout::of(attributes, options, left, &scales);
         let wedges = attributes.wedge_count();
         let mut values = Vec::with_capacity(wedges * layout.width());
         for wedge in 0..wedges {
