@@ -81,8 +81,11 @@ fn write_and_read(mesh: &IndexedMesh, way: u8) {
         assert!(back.triangles().iter().copied().eq(mesh.sides()), "numbers");
         assert_eq!(back.positions().len(), mesh.positions().len());
     }
-    // A vertex stands more than once where something else than texture coordinates differs within it.
-    let may_copy = format == Format::Stl || !mesh.attributes().channels.is_empty();
+    // A vertex stands more than once where something else than texture coordinates differs within it, and
+    // in glTF in each group that has it.
+    let attributes = mesh.attributes();
+    let has_parts = is_gltf && attributes.groups.len() > 1;
+    let may_copy = format == Format::Stl || has_parts || !attributes.channels.is_empty();
     assert!(copies == 0 || may_copy, "{copies} copies of vertices");
     let is_far = mesh.origin().to_array() != [0.0; 3];
     let is_single = format == Format::Stl && !options.ascii;
