@@ -177,7 +177,18 @@ fn check_carried(mesh: &IndexedMesh, back: &IndexedMesh, format: Format) {
                 let back = mesh.is_double_sided(i).then_some([a, c, b]);
                 std::iter::once([a, b, c]).chain(back)
             });
-            let row = |wedge: u32| channel.row(wedge as usize).take(width);
+            // Textures of glTF are turned over where they are written to a file that counts upwards.
+            let is_down = mesh.attributes().v_is_down;
+            let is_turned = is_down && channel.kind == Kind::TextureCoordinate;
+            let upwards = move |(i, x): (usize, f64)| match channel.components[i].number {
+                _ if i != 1 || !is_turned => x,
+                NumberType::F32 => f64::from((1.0 - x) as f32),
+                number => number.range().map_or(1.0, |(_, most)| most) - x,
+            };
+            let row = |wedge: u32| {
+                let row = channel.row(wedge as usize).take(width);
+                row.enumerate().map(upwards)
+            };
             // Zero has no sign in integers.
             let bits = |x: f64| {
                 if x.is_nan() {
