@@ -7,7 +7,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use decimate::attributes::{Channel, Kind, NumberType, Property};
+use decimate::attributes::{Attributes, Channel, Kind, NumberType, Property};
 use decimate::decimate::{Boundary, Options, Placement, Quality, Targets, Topology};
 use decimate::indexed_mesh::IndexedMesh;
 use decimate::io::{Format, ReadOptions, WriteOptions, read_from, write_to};
@@ -98,11 +98,9 @@ fn write_and_read(mesh: &IndexedMesh, way: u8) {
     let step = f64::from(f32::EPSILON) * span(mesh).max(span(&back));
     let corners = |mesh: &IndexedMesh| -> Vec<[f64; 3]> {
         let points: Vec<_> = mesh.points().collect();
-        let group_of = |i: usize| mesh.attributes().group_of.get(i);
-        // glTF has the triangles of a group side by side.
         let mut order: Vec<usize> = (0..mesh.triangles().len()).collect();
-        if is_gltf {
-            order.sort_by_key(|&i| group_of(i));
+        if is_gltf && !mesh.attributes().group_of.is_empty() {
+            order.sort_by_key(|&i| side_by_side(mesh.attributes(), i));
         }
         let sides = order.into_iter().flat_map(|i| {
             let [a, b, c] = mesh.triangles()[i];
@@ -128,6 +126,18 @@ fn write_and_read(mesh: &IndexedMesh, way: u8) {
         assert!(is_equal, "{p} was read back as {q}");
     }
     check_carried(mesh, &back, format);
+}
+
+/// The place in a glTF file of a triangle's object, which is that of the first group with triangles, and
+/// of its group: triangles of a group stand side by side there, and groups of an object.
+fn side_by_side(attributes: &Attributes, i: usize) -> [u32; 2] {
+    let object = |g: u32| &attributes.groups[g as usize].object;
+    let group = attributes.group_of[i];
+    let of_object = attributes
+        .group_of
+        .iter()
+        .filter(|&&g| object(g) == object(group));
+    [*of_object.min().expect("it is one"), group]
 }
 
 /// Each corner has the numbers that it had, of each channel that the format has a place for, and each
