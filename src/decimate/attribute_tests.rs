@@ -2,9 +2,13 @@
 
 use glam::Vec3;
 
+use super::surface::{Plan, Way};
 use super::*;
 use crate::attributes::{Channel, Group, Kind};
+use crate::for_each_tier;
+use crate::mesh::EdgeId;
 use crate::metrics::info;
+use crate::progress::unheard;
 use crate::shapes::{self, Shape};
 
 const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Standard, Quality::Best];
@@ -319,6 +323,164 @@ fn groups_keep_their_area() {
         }
     }
 }
+
+/// Twenty islands of other materials on a sphere, of four faces each, and as few triangles as can be: no
+/// island is ever gone, since the curve around its last face does not collapse.
+fn islands_of_materials_stay<S: EdgeStore>() {
+    let (positions, triangles) = shapes::icosphere(3);
+    // The middle of the middle of each face of the icosahedron.
+    let island = |i: usize| if i % 64 < 60 { 0 } else { 1 + i as u32 / 64 };
+    let attributes = Attributes {
+        group_of: (0..triangles.len()).map(island).collect(),
+        groups: vec![Group::default(); 21],
+        ..Attributes::default()
+    };
+    let mesh = IndexedMesh::new(positions, triangles).unwrap();
+    let mesh = mesh.with_attributes(attributes).unwrap();
+    for quality in QUALITIES {
+        for usage in [AttributeUse::Optimize, AttributeUse::Carry] {
+            let options = Options {
+                tier: TierChoice::Fixed(S::TIER),
+                check: false,
+                ..keeping(0.0, quality, usage)
+            };
+            let (small, report) = decimate(mesh.clone(), &options).unwrap();
+            let mut faces = [0; 21];
+            for &group in &small.attributes().group_of {
+                faces[group as usize] += 1;
+            }
+            let islands = &faces[1..];
+            assert_eq!(islands, [1; 20], "{quality:?} {usage:?}");
+            assert!(report.blocked.unwrap().link > 0, "{quality:?} {usage:?}");
+        }
+    }
+}
+
+/// A flat square wound up in the texture: the surface allows any collapse, and still no triangle turns
+/// over in the texture.
+fn no_triangle_turns_over_in_the_texture<S: EdgeStore>() {
+    let wound = |p: Vec3| {
+        let p = p - Vec3::new(0.5, 0.5, 0.0);
+        let inside = (1.0 - 4.0 * p.length_squared()).max(0.0);
+        let (sin, cos) = (2.0 * inside * inside).sin_cos();
+        vec![cos * p.x - sin * p.y, sin * p.x + cos * p.y]
+    };
+    let mesh = carrying(shapes::grid(24, 24), vec![texture()], |_, p| wound(p));
+    let areas = |mesh: &IndexedMesh| -> Vec<f64> {
+        let area = |face: [(Vec3, Vec<f64>); 3]| {
+            let [a, b, c] = face.each_ref().map(|(_, row)| [row[0], row[1]]);
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        faces(mesh).into_iter().map(area).collect()
+    };
+    assert!(areas(&mesh).iter().all(|&area| area > 0.0));
+    for quality in QUALITIES {
+        for usage in [AttributeUse::Optimize, AttributeUse::Carry] {
+            let options = Options {
+                tier: TierChoice::Fixed(S::TIER),
+                check: false,
+                ..keeping(0.1, quality, usage)
+            };
+            let (small, _) = decimate(mesh.clone(), &options).unwrap();
+            let turned = areas(&small).iter().filter(|&&area| area <= 0.0).count();
+            assert_eq!(turned, 0, "{quality:?} {usage:?}");
+        }
+    }
+}
+
+/// The surface of a mesh with its attributes, prepared as for a run.
+fn surface_of<S: EdgeStore>(mesh: IndexedMesh, options: &Options) -> Surface<S> {
+    let (min, max) = mesh.bounds().unwrap();
+    let room = Room::around([min, max]);
+    let mut parts = mesh.into_parts();
+    let attributes = std::mem::take(&mut parts.attributes);
+    let mut flat = Flat::<()>::of(parts);
+    let geometry = (&flat.positions[..], &flat.triangles[..]);
+    let left = flat.triangles.len() / 2;
+    flat.wedges = FlatWedges::of(&attributes, geometry, room.scale(), left, options);
+    let mesh = Mesh::from_triangles(flat.positions.len(), &flat.triangles);
+    let (mut surface, _) = flat.into_surface(mesh, room, &[]);
+    unheard(|meter| surface.prepare(options, meter));
+    surface
+}
+
+/// A cost that followed collapses at random, along and off seams, says what one says that is made
+/// afresh of what is left: of every edge, but for rounding.
+fn a_cost_follows_what_collapses<S: EdgeStore>() {
+    let options = keeping(0.0, Quality::Standard, AttributeUse::Optimize);
+    let wave = |x: f32| 0.5 + 0.5 * (5.0 * x).sin();
+    let mesh = carrying(
+        shapes::torus(14, 9),
+        vec![color(), texture()],
+        |centroid, p| {
+            let [s, t] = if centroid.x < 0.0 {
+                [p.x, p.y]
+            } else {
+                [p.z + 3.0, p.y]
+            };
+            vec![wave(p.x), wave(p.y), wave(p.z), s, t]
+        },
+    );
+    let mut surface = surface_of::<S>(mesh, &options);
+    let fresh = |surface: &Surface<S>| unheard(|meter| Memoryless::new(surface, &options, meter));
+    let mut cost = fresh(&surface);
+    let mut state = 1u64;
+    let mut random = |n: usize| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 33) as usize % n
+    };
+    let (mut collapses, mut at_seams, mut changed) = (0, 0, Vec::new());
+    for _ in 0..600 {
+        let edges: Vec<EdgeId> = surface.mesh.edges().collect();
+        let e = edges[random(edges.len())];
+        let Some(evaluation) = cost.evaluate(&surface, e, surface.held(e)) else {
+            continue;
+        };
+        let is_kept = surface.mesh.link_condition(e) && surface.curves.stay_apart(&surface.mesh, e);
+        let way = Way::Collapse(None);
+        let position = evaluation.position;
+        let Some(deviation) = surface
+            .deviation_after(e, &way, position)
+            .filter(|_| is_kept)
+        else {
+            continue;
+        };
+        let carried = Cost::<S>::carried(&cost, &surface, e, position);
+        let plan = Plan {
+            way,
+            deviation,
+            carried,
+        };
+        at_seams += usize::from(plan.carried.len() > 1);
+        let merged = surface.collapse(e, position, &plan);
+        cost.after_collapse(&surface, &merged, &mut changed);
+        collapses += 1;
+        let fresh = fresh(&surface);
+        for e in surface.mesh.edges() {
+            let costs = [&cost, &fresh].map(|cost| cost.evaluate(&surface, e, surface.held(e)));
+            let [Some(found), Some(expected)] = costs else {
+                assert_eq!(costs[0].is_some(), costs[1].is_some(), "{e:?}");
+                continue;
+            };
+            let wrong = (found.cost - expected.cost).abs();
+            assert!(
+                wrong <= 1e-3 * expected.cost + 1e-7,
+                "{e:?} after {collapses}: {} for {}",
+                found.cost,
+                expected.cost
+            );
+        }
+    }
+    assert!(collapses > 50 && at_seams > 10, "{collapses}, {at_seams}");
+}
+
+for_each_tier!(
+    islands_of_materials_stay,
+    no_triangle_turns_over_in_the_texture,
+    a_cost_follows_what_collapses,
+);
 
 /// A sphere that a program wrote with the direction of each face at its corners: smooth but for that,
 /// so that it decimates as if it had no normals. A cube's edges stay.

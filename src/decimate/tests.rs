@@ -2,9 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
+use super::surface::Way;
 use super::*;
 use crate::for_each_tier;
 use crate::indexed_mesh::MeshBuilder;
+use crate::mesh::{EdgeId, FaceId, VertexId};
 use crate::metrics::{CompareOptions, Comparison, compare, info};
 use crate::nearest::Triangles;
 use crate::shapes::{self, Shape};
@@ -47,6 +49,17 @@ fn to_error(max_error: f64) -> Options {
 
 fn run_in<S: EdgeStore>(shape: Shape, options: Options) -> (IndexedMesh, Report) {
     decimate(mesh(shape), &tiered::<S>(options)).unwrap()
+}
+
+/// The surface of a shape, of which nothing is kept.
+fn surface_of<S: EdgeStore>(shape: Shape) -> Surface<S> {
+    let original = mesh(shape);
+    let (min, max) = original.bounds().unwrap();
+    let parts = original.into_parts();
+    let triangles = Mesh::from_triangles(parts.positions.len(), &parts.triangles);
+    let flat = Flat::<()>::of(parts);
+    flat.into_surface(triangles, Room::around([min, max]), &[])
+        .0
 }
 
 /// [`to_triangles`], in a quality.
@@ -399,6 +412,86 @@ fn an_error_limit_is_kept<S: EdgeStore>() {
     }
 }
 
+/// Wherever the ends of any edge go, a collapse is refused if and only if a face that stays turns by 90°
+/// or more: by brute force over all faces, but where rounding decides.
+fn what_turns_is_refused<S: EdgeStore>() {
+    let mut state = 3u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    let mut found = [0; 2];
+    for shape in [bumpy(6), shapes::torus(9, 6), shapes::three_fins(3)] {
+        let surface = surface_of::<S>(shape);
+        let mesh = &surface.mesh;
+        let at = |v: VertexId| surface.geometry.position(v).as_dvec3();
+        for e in mesh.edges() {
+            let ends = mesh.edge_vertices(e);
+            let position = surface.geometry.position(ends[0])
+                + 0.5 * Vec3::new(random() - 0.5, random() - 0.5, random() - 0.5);
+            let to = position.as_dvec3();
+            let cosine = |f: FaceId| {
+                let corners = mesh.face_vertices(f);
+                let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize();
+                let is_at = ends.map(|end| corners.contains(&end));
+                let moved = |v| if ends.contains(&v) { to } else { at(v) };
+                (is_at[0] != is_at[1])
+                    .then(|| normal(corners.map(at)).dot(normal(corners.map(moved))))
+            };
+            let least = mesh.faces().filter_map(cosine).fold(1.0, f64::min);
+            if least.abs() < 1e-3 {
+                continue;
+            }
+            let disks = mesh.disks(e);
+            let between_disks = disks.as_ref().map(|disks| Way::Collapse(Some(disks)));
+            for way in [Some(Way::Collapse(None)), between_disks]
+                .into_iter()
+                .flatten()
+            {
+                let is_allowed = surface.deviation_after(e, &way, position).is_some();
+                assert_eq!(is_allowed, least > 0.0, "{e:?} to {position}: {least}");
+                found[usize::from(is_allowed)] += 1;
+            }
+        }
+    }
+    assert!(found.iter().all(|&found| found > 100), "{found:?}");
+}
+
+/// The merged vertex is as far from the original as the farther end was, and what the collapse moves it
+/// beside: whichever end that was, wherever it goes, between two disks or as any edge.
+fn how_far_an_end_was_is_added<S: EdgeStore>() {
+    let mut surface = surface_of::<S>(bumpy(5));
+    let mut found = [0; 2];
+    let edges: Vec<EdgeId> = surface.mesh.edges().collect();
+    for e in edges {
+        let ends = surface.mesh.edge_vertices(e);
+        let [tail, head] = ends.map(|v| surface.geometry.position(v));
+        for position in [tail, head, (tail + head) / 2.0] {
+            let as_any_edge = Some(Way::Collapse(None));
+            let disks = surface.mesh.disks(e);
+            let between_disks = disks.as_ref().map(|disks| Way::Collapse(Some(disks)));
+            for (way, found) in [as_any_edge, between_disks].iter().zip(&mut found) {
+                let Some(way) = way else { continue };
+                let Some(moved) = surface.deviation_after(e, way, position) else {
+                    continue;
+                };
+                for far in ends {
+                    surface.deviation[far.index()] = 0.25;
+                    assert_eq!(
+                        surface.deviation_after(e, way, position),
+                        Some(0.25 + moved)
+                    );
+                    surface.deviation[far.index()] = 0.0;
+                }
+                *found += 1;
+            }
+        }
+    }
+    assert!(found.iter().all(|&found| found > 50), "{found:?}");
+}
+
 /// A face and its opposite stay together, count as two, and come out as two.
 fn double_sided_sheets_stay_double<S: EdgeStore>() {
     let (positions, mut triangles) = bumpy(10);
@@ -716,6 +809,8 @@ for_each_tier!(
     a_free_boundary_moves_more_than_a_kept_one,
     endpoint_placement_takes_a_subset,
     an_error_limit_is_kept,
+    what_turns_is_refused,
+    how_far_an_end_was_is_added,
     double_sided_sheets_stay_double,
     turned_faces_do_not_stand_in_the_way,
     ratio_one_is_the_identity,
@@ -1506,10 +1601,61 @@ mod chunked {
         }
     }
 
+    /// Where nothing costs anything no threshold stops a chunk, and all could go: the target does.
+    fn chunks_stop_at_the_target<S: EdgeStore>() {
+        for quality in QUALITIES {
+            let options = in_chunks(quality, 1000, Chunks::Triangles(300));
+            let (_, report) = run_in::<S>(shapes::grid(42, 42), options);
+            assert!(report.chunks > 2 && report.collapses_in_chunks > 0);
+            let left = report.triangles_out;
+            assert!((999..=1000).contains(&left), "{quality:?}: {left}");
+        }
+    }
+
+    /// Chunks in which nothing may collapse add up what they know of vertices, and to that the lines of
+    /// the boundaries and non-manifold edges on a seam: every edge costs what it costs in the whole, but
+    /// for rounding.
+    fn chunks_add_up_to_the_whole<S: EdgeStore>() {
+        for (name, shape) in [("sheet", bumpy(24)), ("fins", shapes::three_fins(16))] {
+            let original = mesh(shape);
+            let (min, max) = original.bounds().unwrap();
+            let room = Room::around([min, max]);
+            let options = in_chunks(Quality::Fast, 1, Chunks::Triangles(60));
+            let mut flat = Flat::of(original.into_parts());
+            flat.locked = vec![true; flat.positions.len()];
+            let chunked = Chunked {
+                options: &options,
+                stop: Stop {
+                    triangles: 1,
+                    max_error: None,
+                    max_cost: f32::INFINITY,
+                },
+                room,
+            };
+            let done = chunked.reduce::<S, Accumulated>(&mut flat, &mut Meter::unheard());
+            assert!(done.unwrap().chunks > 20);
+            let whole = Mesh::<S>::from_triangles(flat.positions.len(), &flat.triangles);
+            let (surface, states) = flat.into_surface(whole, room, &[]);
+            let meter = &mut Meter::unheard();
+            let in_chunks = Accumulated::with_states(&surface, &options, states, meter).unwrap();
+            let at_once = Accumulated::new(&surface, &options, meter).unwrap();
+            for e in surface.mesh.edges() {
+                let cost = |of: &Accumulated| of.evaluate(&surface, e, [true, false]).unwrap().cost;
+                let (found, expected) = (cost(&in_chunks), cost(&at_once));
+                assert!(
+                    (found - expected).abs() <= 1e-4 * expected + 1e-9,
+                    "{name}, {e:?}: {found} for {expected}"
+                );
+            }
+        }
+    }
+
     for_each_tier!(
         chunks_are_the_same_bytes_with_any_number_of_threads,
         chunks_know_what_the_whole_knows,
         chunks_stop_at_the_largest_error,
+        chunks_stop_at_the_target,
+        chunks_add_up_to_the_whole,
         chunks_count_what_is_not_manifold,
     );
 }
