@@ -790,11 +790,10 @@ fn assemble<S: EdgeStore, C: Cost<S>>(
         .flat_map(|edge| {
             let [a, b] = edge[0].ends();
             let [p, q] = [a, b].map(|v| flat.positions[v as usize].as_dvec3() * room.scale());
+            let weight = |v: u32| flat.weights.get(v as usize).map_or(1.0, |&w| f64::from(w));
             [a, b].map(|v| {
-                (
-                    renamed[v as usize],
-                    C::line(options, q - p, edge.len() == 1),
-                )
+                let line = C::line(options, q - p, edge.len() == 1, weight(v));
+                (renamed[v as usize], line)
             })
         })
         .collect();

@@ -1613,11 +1613,18 @@ mod chunked {
     }
 
     /// Chunks in which nothing may collapse add up what they know of vertices, and to that the lines of
-    /// the boundaries and non-manifold edges on a seam: every edge costs what it costs in the whole, but
-    /// for rounding.
+    /// the boundaries and non-manifold edges on a seam, times the weights of vertices: every edge costs
+    /// what it costs in the whole, but for rounding.
     fn chunks_add_up_to_the_whole<S: EdgeStore>() {
-        for (name, shape) in [("sheet", bumpy(24)), ("fins", shapes::three_fins(16))] {
+        for (name, shape, weights) in [
+            ("sheet", bumpy(24), &[1.0][..]),
+            ("fins", shapes::three_fins(16), &[1.0]),
+            ("weighted sheet", bumpy(24), &[1.0, 9.0, 0.5]),
+        ] {
             let original = mesh(shape);
+            let count = original.positions().len();
+            let weights = weights.iter().copied().cycle().take(count).collect();
+            let original = original.with_weights(weights).unwrap();
             let (min, max) = original.bounds().unwrap();
             let room = Room::around([min, max]);
             let options = in_chunks(Quality::Fast, 1, Chunks::Triangles(60));

@@ -198,14 +198,14 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         self.quadrics
     }
 
-    fn line(options: &Options, along: DVec3, is_boundary: bool) -> Quadric {
-        let weight = if is_boundary {
+    fn line(options: &Options, along: DVec3, is_boundary: bool, weight: f64) -> Quadric {
+        let of_edge = if is_boundary {
             boundary_weight(options.boundary)
         } else {
             BOUNDARY_WEIGHT
         };
         let mut a = Symmetric::default();
-        a.add_line(along, LINE_WEIGHT * weight);
+        a.add_line(along, LINE_WEIGHT * of_edge * weight);
         Quadric::new(a, DVec3::ZERO, 0.0)
     }
 

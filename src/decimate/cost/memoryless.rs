@@ -222,7 +222,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         vec![(); self.tensors.len()]
     }
 
-    fn line(_: &Options, _: DVec3, _: bool) {}
+    fn line(_: &Options, _: DVec3, _: bool, _: f64) {}
 
     fn join((): &mut (), (): &()) {}
 

@@ -59,9 +59,9 @@ pub trait Cost<S: EdgeStore>: Send + Sync + Sized {
     /// The states, one a vertex slot.
     fn into_states(self) -> Vec<Self::State>;
 
-    /// What a boundary or non-manifold edge adds to the state of each of its ends; `along` it, in
+    /// What a boundary or non-manifold edge adds to the state of an end of this weight; `along` it, in
     /// the unit box.
-    fn line(options: &Options, along: DVec3, is_boundary: bool) -> Self::State;
+    fn line(options: &Options, along: DVec3, is_boundary: bool, weight: f64) -> Self::State;
 
     /// Adds to a state what other faces or lines say.
     fn join(state: &mut Self::State, part: &Self::State);
