@@ -59,8 +59,68 @@ enum Rejection {
 struct Component {
     /// What it costs to remove it.
     loss: Loss,
-    /// Its faces at the start.
+    /// The slots of its faces, and maybe some that were used again elsewhere.
     faces: Vec<FaceId>,
+}
+
+/// The components of a surface that may be removed.
+#[derive(Default)]
+struct Components {
+    /// The cheapest last, and the dearest, which stays, left out.
+    removable: Vec<Component>,
+    /// Where among them the component of each face stands; [`STAYS`] for the dearest.
+    of_face: Vec<u32>,
+}
+
+/// No component.
+const STAYS: u32 = u32::MAX;
+
+impl Components {
+    fn of<S: EdgeStore>(surface: &Surface<S>) -> Self {
+        let components = surface.mesh.components().into_iter();
+        let mut removable: Vec<Component> = components
+            .map(|faces| Component {
+                loss: surface.loss(&faces),
+                faces,
+            })
+            .collect();
+        removable.sort_by(|a, b| {
+            let by_price = b.loss.price.total_cmp(&a.loss.price);
+            by_price.then(a.faces[0].cmp(&b.faces[0]))
+        });
+        if !removable.is_empty() {
+            removable.remove(0);
+        }
+        let mut of_face = vec![STAYS; surface.mesh.face_slots()];
+        for (i, component) in removable.iter().enumerate() {
+            for f in &component.faces {
+                of_face[f.index()] = i as u32;
+            }
+        }
+        Self { removable, of_face }
+    }
+
+    /// The slot of `face` is used again, in the component of `beside`.
+    fn move_face(&mut self, face: FaceId, beside: FaceId) {
+        let Some(&component) = self.of_face.get(beside.index()) else {
+            return;
+        };
+        self.of_face[face.index()] = component;
+        if let Some(component) = self.removable.get_mut(component as usize) {
+            component.faces.push(face);
+        }
+    }
+
+    /// Takes out the cheapest, with its faces as they are now.
+    fn pop<S: EdgeStore>(&mut self, mesh: &Mesh<S>) -> Option<Component> {
+        let mut component = self.removable.pop()?;
+        let number = self.removable.len() as u32;
+        let is_here = |f: &FaceId| self.of_face[f.index()] == number && mesh.is_live_face(*f);
+        component.faces.retain(is_here);
+        component.faces.sort_unstable();
+        component.faces.dedup();
+        Some(component)
+    }
 }
 
 /// A surface being decimated under one cost.
@@ -83,8 +143,8 @@ pub struct Greedy<S, C, Q> {
     triangles: usize,
     stop: Stop,
     topology: Topology,
-    /// What may be removed, the cheapest last; nothing where the topology stays.
-    components: Vec<Component>,
+    /// What may be removed; nothing where the topology stays.
+    components: Components,
     /// Dead slots, to be used again where a pinch needs some.
     free_faces: Vec<FaceId>,
     free_vertices: Vec<VertexId>,
@@ -120,8 +180,8 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             },
             topology,
             components: match topology {
-                Topology::Preserve => Vec::new(),
-                Topology::Simplify => removable(&surface),
+                Topology::Preserve => Components::default(),
+                Topology::Simplify => Components::of(&surface),
             },
             surface,
             free_faces: Vec::new(),
@@ -210,7 +270,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 Halt::Empty | Halt::Cost(_) => {}
             }
             if !self.revive(meter)? {
-                if self.components.is_empty() {
+                if self.components.removable.is_empty() {
                     return Ok(self.blocked(meter)?);
                 }
                 self.remove_component();
@@ -237,6 +297,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             let e = candidate.edge;
             if self
                 .components
+                .removable
                 .last()
                 .is_some_and(|c| c.loss.price < candidate.cost)
             {
@@ -545,11 +606,10 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
 
     /// Removes the cheapest component, unless that would overshoot the target or the error.
     fn remove_component(&mut self) {
-        let Some(component) = self.components.pop() else {
+        let Some(component) = self.components.pop(&self.surface.mesh) else {
             return;
         };
-        let mut faces = component.faces;
-        faces.retain(|&f| self.surface.mesh.is_live_face(f));
+        let faces = component.faces;
         let triangles: usize = faces.iter().map(|&f| self.surface.sides(f)).sum();
         let has_locked = |f: &FaceId| {
             let vertices = self.surface.mesh.face_vertices(*f);
@@ -584,6 +644,7 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             return false;
         };
         let around = self.surface.fill(e, face);
+        self.components.move_face(face, e.face());
         self.free_faces.pop();
         self.triangles += 1;
         self.tally.filled_faces += 1;
@@ -627,6 +688,9 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         let (caps, vertices) = ([*a, *b], [*x, *y, *z]);
         if self.surface.pinch(&edges, caps, vertices).is_none() {
             return;
+        }
+        for cap in caps {
+            self.components.move_face(cap, edges[0].face());
         }
         self.free_faces.truncate(self.free_faces.len() - 2);
         self.free_vertices.truncate(self.free_vertices.len() - 3);
@@ -793,24 +857,4 @@ fn outdated<S: EdgeStore, Q: Queue>(mesh: &Mesh<S>, queue: &mut Q, e: EdgeId) ->
         Opposite::NonManifold(_) => queue.outdate(mesh.canonical(e)),
     };
     (!is_queued).then(|| mesh.canonical(e))
-}
-
-/// The components of a surface by what removing them costs, the cheapest last and the dearest, which
-/// stays, left out.
-fn removable<S: EdgeStore>(surface: &Surface<S>) -> Vec<Component> {
-    let components = surface.mesh.components().into_iter();
-    let mut components: Vec<Component> = components
-        .map(|faces| Component {
-            loss: surface.loss(&faces),
-            faces,
-        })
-        .collect();
-    components.sort_by(|a, b| {
-        let by_price = b.loss.price.total_cmp(&a.loss.price);
-        by_price.then(a.faces[0].cmp(&b.faces[0]))
-    });
-    if !components.is_empty() {
-        components.remove(0);
-    }
-    components
 }

@@ -795,7 +795,56 @@ fn a_hairline_gap_closes_where_it_may<S: EdgeStore>() {
     }
 }
 
+/// A triangle on its own goes and leaves its slot to a face that closes a gap elsewhere: when its component
+/// is to be removed, that face is not.
+fn a_slot_used_again_is_in_its_new_component<S: EdgeStore>() {
+    let positions = [
+        [0.0, 2.0, 2.0],
+        [0.0, 2.0, 4.0178e-41],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 2.0],
+        [2.0, 2.0, 2.0],
+        [2.0, 2.0003662, 0.0],
+        [0.0, 2.0, 0.0],
+        [2.0, 0.0, 2.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 2.0, 0.0],
+        [1.105521e-38, 0.0, 2.0],
+        [1.2877817e-7, 5.828742e-10, 8.480118e-33],
+        [1.5165264e-19, 3.2178946e-8, 2.387278e-6],
+        [3.2180765e-8, 5.9680497e-7, 2.1596146],
+        [2.0, 2.0, 2.0000138],
+        [0.0078125, 2.0, 0.0],
+    ];
+    let triangles = [
+        [0, 1, 2],
+        [2, 3, 0],
+        [4, 5, 6],
+        [6, 0, 4],
+        [7, 8, 9],
+        [9, 4, 8],
+        [3, 2, 8],
+        [8, 7, 10],
+        [11, 12, 13],
+        [3, 7, 14],
+        [8, 2, 15],
+        [6, 9, 8],
+    ];
+    for quality in QUALITIES {
+        let shape = (positions.map(Vec3::from).to_vec(), triangles.to_vec());
+        let options = Options {
+            topology: Topology::Simplify,
+            weld: false,
+            ..to_triangles_in(quality, 6)
+        };
+        let (out, report) = run_in::<S>(shape, options);
+        assert!(report.tally.filled_faces > 0, "{quality:?}");
+        assert_eq!(out.triangles().len(), 6, "{quality:?}");
+    }
+}
+
 for_each_tier!(
+    a_slot_used_again_is_in_its_new_component,
     a_cube_comes_down_to_its_corners,
     a_turned_cube_comes_down_to_its_corners,
     a_wall_comes_down_to_its_rims,
