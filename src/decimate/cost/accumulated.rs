@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use wide::f32x4;
 
-use super::attributes::{AttributeForms, carried};
+use super::attributes::{AttributeForms, carried, corrected};
 use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, crease_weight,
@@ -229,19 +229,22 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
-        if self.attributes.is_some() {
-            return edges.map(|e| {
-                let evaluation = self.evaluate(surface, e, [false; 2]);
-                evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
-            });
-        }
         let tails = each(*edges, |e| surface.mesh.tail(e));
         let heads = each(*edges, |e| surface.mesh.head(e));
         let scale = f32x4::splat(surface.geometry.scale() as f32);
         let along = between(&places(surface, tails), &places(surface, heads), scale);
         let (at_tail, at_head) = (self.numbers(tails), self.numbers(heads));
-        let least = least(&at_tail, &at_head, along, self.placement, |_| {});
-        least.costs().to_array()
+        let Some(attributes) = &self.attributes else {
+            let least = least(&at_tail, &at_head, along, self.placement, |_| {});
+            return least.costs().to_array();
+        };
+        let mut is_too_much = [false; LANES];
+        let least = least(&at_tail, &at_head, along, self.placement, |form| {
+            is_too_much = attributes.add_to_lanes(form, surface, edges);
+        });
+        corrected(least.costs().to_array(), is_too_much, edges, |e| {
+            self.evaluate(surface, e, [false; 2])
+        })
     }
 
     fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried {

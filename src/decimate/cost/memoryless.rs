@@ -7,7 +7,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::attributes::{AttributeForms, carried};
+use super::attributes::{AttributeForms, carried, corrected};
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
 use super::{
@@ -266,7 +266,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
         };
         let any_is_heavy =
             |tensors: [&Tensor; LANES]| tensors.iter().fold(false, |any, t| any | t.is_heavy());
-        if any_is_heavy(at_tails) | any_is_heavy(at_heads) | self.attributes.is_some() {
+        if any_is_heavy(at_tails) | any_is_heavy(at_heads) {
             return one_by_one();
         }
         let [a, b, c, d] = *edges;
@@ -299,9 +299,17 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
                 ..SINGLE
             },
         };
-        least(&at_v, &at_w, along, dying, weight, precision, |_| {})
-            .costs()
-            .to_array()
+        let Some(attributes) = &self.attributes else {
+            let least = least(&at_v, &at_w, along, dying, weight, precision, |_| {});
+            return least.costs().to_array();
+        };
+        let mut is_too_much = [false; LANES];
+        let least = least(&at_v, &at_w, along, dying, weight, precision, |form| {
+            is_too_much = attributes.add_to_lanes(form, surface, edges);
+        });
+        corrected(least.costs().to_array(), is_too_much, edges, |e| {
+            self.evaluate(surface, e, [false; 2])
+        })
     }
 
     fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried {

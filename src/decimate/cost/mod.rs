@@ -9,7 +9,7 @@ mod memoryless;
 mod star;
 
 pub use accumulated::Accumulated;
-pub use attributes::AttributeForms;
+pub use attributes::{AttributeForms, stride as attribute_stride};
 pub use form::{LANES, cross, dot, minus};
 use form::{Lanes, Least, Vector};
 pub use memoryless::Memoryless;
@@ -182,6 +182,13 @@ fn each<T, U>(four: [T; LANES], f: impl Fn(T) -> U) -> [U; LANES] {
     [f(a), f(b), f(c), f(d)]
 }
 
+/// [`each`], of what stays where it is.
+#[inline(always)]
+fn each_ref<'a, T, U>(four: &'a [T; LANES], f: impl Fn(&'a T) -> U) -> [U; LANES] {
+    let [a, b, c, d] = four;
+    [f(a), f(b), f(c), f(d)]
+}
+
 /// Numbers in double precision.
 #[inline(always)]
 fn doubles<const N: usize>(numbers: &[f32; N]) -> [f64; N] {
@@ -194,8 +201,11 @@ fn doubles<const N: usize>(numbers: &[f32; N]) -> [f64; N] {
 
 /// Four of the numbers that each of four lists has, number by number.
 #[inline(always)]
-fn part<const N: usize>(lists: [&[f32; N]; LANES], first: usize) -> [Lanes; 4] {
-    let four = |list: &[f32; N]| Lanes::new(*list[first..].first_chunk().expect("as many numbers"));
+fn part<L: AsRef<[f32]> + ?Sized>(lists: [&L; LANES], first: usize) -> [Lanes; 4] {
+    let four = |list: &L| {
+        let numbers = list.as_ref()[first..].first_chunk();
+        Lanes::new(*numbers.expect("as many numbers"))
+    };
     Lanes::transpose(each(lists, four))
 }
 
