@@ -399,6 +399,12 @@ impl Wedges {
         self.is_split = is_split;
     }
 
+    /// Whether the corners of a vertex may have several wedges.
+    #[inline(always)]
+    pub fn has_several(&self, v: VertexId) -> bool {
+        self.is_split[v.index()]
+    }
+
     /// The wedges at a vertex.
     pub fn at_vertex<S: EdgeStore>(&self, mesh: &Mesh<S>, v: VertexId) -> SmallVec<[u32; 4]> {
         let mut wedges = SmallVec::new();

@@ -201,11 +201,8 @@ fn doubles<const N: usize>(numbers: &[f32; N]) -> [f64; N] {
 
 /// Four of the numbers that each of four lists has, number by number.
 #[inline(always)]
-fn part<L: AsRef<[f32]> + ?Sized>(lists: [&L; LANES], first: usize) -> [Lanes; 4] {
-    let four = |list: &L| {
-        let numbers = list.as_ref()[first..].first_chunk();
-        Lanes::new(*numbers.expect("as many numbers"))
-    };
+fn part<const N: usize>(lists: [&[f32; N]; LANES], first: usize) -> [Lanes; 4] {
+    let four = |list: &[f32; N]| Lanes::new(*list[first..].first_chunk().expect("as many numbers"));
     Lanes::transpose(each(lists, four))
 }
 
