@@ -104,7 +104,10 @@ impl Load {
         let words = match options.attributes {
             AttributeUse::Ignore => 0,
             AttributeUse::Carry => words + attributes.wedge_count() * numbers,
-            AttributeUse::Optimize => words + attributes.wedge_count() * (4 * numbers + 7),
+            AttributeUse::Optimize => {
+                let rows = numbers + super::cost::attribute_stride(numbers);
+                words + attributes.wedge_count() * rows + mesh.positions().len().div_ceil(4)
+            }
         };
         Self {
             vertices: mesh.positions().len(),

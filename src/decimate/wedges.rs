@@ -33,8 +33,8 @@ pub struct Layout {
     pub usage: AttributeUse,
     /// Where the numbers of each channel stand, and what they are.
     parts: Vec<(Kind, Range<usize>)>,
-    /// By what the square of a number's error is multiplied, in the unit box.
-    pub factors: Vec<f64>,
+    /// By what a number's error is multiplied, in the unit box.
+    pub scales: Vec<f64>,
     /// What a number may be.
     bounds: Vec<(f32, f32)>,
 }
@@ -42,7 +42,7 @@ pub struct Layout {
 impl Layout {
     /// The numbers of a wedge.
     pub fn width(&self) -> usize {
-        self.factors.len()
+        self.scales.len()
     }
 
     fn parts_of(&self, kind: Kind) -> impl Iterator<Item = Range<usize>> + '_ {
@@ -60,21 +60,17 @@ impl Layout {
         };
         let mut texture_scale = texture_scale.iter();
         for channel in &attributes.channels {
-            let begin = layout.factors.len();
+            let begin = layout.scales.len();
             let unit = match channel.kind {
                 Kind::Normal => 1.0,
                 Kind::Color => channel.components[0].number.range().map_or(1.0, |r| r.1),
                 Kind::TextureCoordinate => 1.0 / texture_scale.next().copied().unwrap_or(0.0),
                 Kind::Scalar => span(channel),
             };
-            let factor = options.attribute_weights.of(channel.kind, left) / unit;
-            let factor = if factor.is_finite() {
-                factor * factor
-            } else {
-                0.0
-            };
+            let scale = options.attribute_weights.of(channel.kind, left) / unit;
+            let scale = if scale.is_finite() { scale } else { 0.0 };
             for component in &channel.components {
-                layout.factors.push(factor);
+                layout.scales.push(scale);
                 let (least, most) = match (component.number.range(), channel.kind) {
                     (Some((least, most)), _) => (least as f32, most as f32),
                     (None, Kind::Color) => color_bounds(channel),
@@ -84,7 +80,7 @@ impl Layout {
             }
             layout
                 .parts
-                .push((channel.kind, begin..layout.factors.len()));
+                .push((channel.kind, begin..layout.scales.len()));
         }
         layout
     }
@@ -338,16 +334,26 @@ pub struct Wedges {
 /// Wedges of the ends of an edge that become one if it collapses, and the numbers it has then.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joined {
-    /// The wedges, and whether each is at the head.
-    pub members: SmallVec<[(u32, bool); 4]>,
+    /// The wedges.
+    pub members: Members,
     /// The numbers.
     pub values: SmallVec<[f32; 8]>,
 }
 
+/// Wedges of the ends of an edge, and whether each is at the head.
+pub type Members = SmallVec<[(u32, bool); 4]>;
+
+/// Wedges of the tail and the head of an edge, by two that become one or one that stays.
+pub type Pairs = SmallVec<[[Option<u32>; 2]; 4]>;
+
 impl Joined {
     fn has(&self, wedge: u32) -> bool {
-        self.members.iter().any(|member| member.0 == wedge)
+        has(&self.members, wedge)
     }
+}
+
+fn has(members: &Members, wedge: u32) -> bool {
+    members.iter().any(|member| member.0 == wedge)
 }
 
 /// All wedges of the vertex that is left of an edge; a list that takes little room where it is empty.
@@ -393,16 +399,23 @@ impl Wedges {
         self.is_split = is_split;
     }
 
+    /// Whether the corners of a vertex may have several wedges.
+    #[inline(always)]
+    pub fn has_several(&self, v: VertexId) -> bool {
+        self.is_split[v.index()]
+    }
+
     /// The wedges at a vertex.
     pub fn at_vertex<S: EdgeStore>(&self, mesh: &Mesh<S>, v: VertexId) -> SmallVec<[u32; 4]> {
         let mut wedges = SmallVec::new();
+        if !self.is_split[v.index()] {
+            wedges.extend(mesh.fans(v).next().map(|e| self.at[e.index()]));
+            return wedges;
+        }
         for e in mesh.outgoing_edges(v) {
             let wedge = self.at[e.index()];
             if !wedges.contains(&wedge) {
                 wedges.push(wedge);
-            }
-            if !self.is_split[v.index()] {
-                break;
             }
         }
         wedges
@@ -428,36 +441,72 @@ impl Wedges {
         [[at(e), at(mesh.next(o))], [at(mesh.next(e)), at(o)]]
     }
 
+    /// The wedges of the tail and the head of an edge, where each has but one.
+    #[inline]
+    pub fn only_at_ends<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> Option<[u32; 2]> {
+        let is_split = mesh.edge_vertices(e).map(|v| self.is_split[v.index()]);
+        let wedges = [e, mesh.next(e)].map(|corner| self.at[corner.index()]);
+        (is_split == [false; 2]).then_some(wedges)
+    }
+
+    /// The wedges of the tail and the head that become one if an edge collapses, pair by pair; those
+    /// that stay what they are without another. Nothing where more than two become one.
+    pub fn pairs<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> Option<Pairs> {
+        let [tails, heads] = mesh.edge_vertices(e).map(|v| self.at_vertex(mesh, v));
+        let mut pairs: Pairs = tails.iter().map(|&tail| [Some(tail), None]).collect();
+        for d in mesh.edge_star(e) {
+            let mut corners = [d, mesh.next(d)];
+            if mesh.tail(d) != mesh.tail(e) {
+                corners.reverse();
+            }
+            let [tail, head] = corners.map(|corner| Some(self.at[corner.index()]));
+            let pair = pairs.iter_mut().find(|pair| pair[0] == tail);
+            let pair = pair.expect("every corner at an end was listed");
+            if pair[1].is_some_and(|other| Some(other) != head) {
+                return None;
+            }
+            pair[1] = head;
+        }
+        for head in heads.into_iter().map(Some) {
+            match pairs.iter().filter(|pair| pair[1] == head).count() {
+                0 => pairs.push([None, head]),
+                1 => {}
+                _ => return None,
+            }
+        }
+        Some(pairs)
+    }
+
     /// The wedges of the ends of an edge, those side by side that become one if it collapses: they have
     /// a corner each in a face at the edge.
-    pub fn joined_by<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> SmallVec<[Joined; 2]> {
-        let ends = mesh.edge_vertices(e);
-        let joined = |members| Joined {
-            members,
-            values: SmallVec::new(),
-        };
-        let is_split = ends.map(|v| self.is_split[v.index()]);
-        if is_split == [false; 2] {
-            let [tail, head] = [e, mesh.next(e)].map(|corner| self.at[corner.index()]);
-            return smallvec![joined(smallvec![(tail, false), (head, true)])];
+    pub fn joined_by<S: EdgeStore>(&self, mesh: &Mesh<S>, e: EdgeId) -> SmallVec<[Members; 2]> {
+        if let Some([tail, head]) = self.only_at_ends(mesh, e) {
+            return smallvec![smallvec![(tail, false), (head, true)]];
         }
-        let mut classes: SmallVec<[Joined; 2]> = SmallVec::new();
-        for (v, is_head) in ends.into_iter().zip([false, true]) {
+        if let Some(pairs) = self.pairs(mesh, e) {
+            let members = |[tail, head]: [Option<u32>; 2]| {
+                let [tail, head] = [tail.map(|w| (w, false)), head.map(|w| (w, true))];
+                tail.into_iter().chain(head).collect()
+            };
+            return pairs.into_iter().map(members).collect();
+        }
+        let mut classes: SmallVec<[Members; 2]> = SmallVec::new();
+        for (v, is_head) in mesh.edge_vertices(e).into_iter().zip([false, true]) {
             for wedge in self.at_vertex(mesh, v) {
-                classes.push(joined(smallvec![(wedge, is_head)]));
+                classes.push(smallvec![(wedge, is_head)]);
             }
         }
         for d in mesh.edge_star(e) {
             let corners = [d, mesh.next(d)].map(|corner| self.at[corner.index()]);
-            let class_of = |classes: &[Joined], wedge: u32| {
-                let class = classes.iter().position(|class| class.has(wedge));
+            let class_of = |classes: &[Members], wedge: u32| {
+                let class = classes.iter().position(|class| has(class, wedge));
                 class.expect("every corner at an end was listed")
             };
             let [a, b] = corners.map(|wedge| class_of(&classes, wedge));
             if a != b {
                 let (first, second) = (a.min(b), a.max(b));
                 let other = classes.remove(second);
-                classes[first].members.extend(other.members);
+                classes[first].extend(other);
             }
         }
         classes
@@ -720,22 +769,24 @@ impl<S: EdgeStore> Surface<S> {
         } else {
             0.0
         };
-        let mut carried = self.wedges.joined_by(&self.mesh, e).into_vec();
-        for joined in &mut carried {
+        let carry = |members: Members| {
             let mean = |i: usize, is_head: bool| {
-                let at_end = joined.members.iter().filter(|m| m.1 == is_head);
+                let at_end = members.iter().filter(|m| m.1 == is_head);
                 let at_end = at_end.map(|m| f64::from(self.wedges.row(m.0)[i]));
                 let (sum, count) = at_end.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
                 (count > 0.0).then_some(sum / count)
             };
             let numbers = 0..self.wedges.layout.width();
-            joined.values = numbers
-                .map(|i| match (mean(i, false), mean(i, true)) {
-                    (Some(a), Some(b)) => (a + (b - a) * t) as f32,
-                    (a, b) => a.or(b).unwrap_or(0.0) as f32,
-                })
-                .collect();
-        }
-        carried
+            let values = numbers.map(|i| match (mean(i, false), mean(i, true)) {
+                (Some(a), Some(b)) => (a + (b - a) * t) as f32,
+                (a, b) => a.or(b).unwrap_or(0.0) as f32,
+            });
+            Joined {
+                values: values.collect(),
+                members,
+            }
+        };
+        let joined = self.wedges.joined_by(&self.mesh, e);
+        joined.into_iter().map(carry).collect()
     }
 }

@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use wide::f32x4;
 
-use super::attributes::{AttributeForms, carried};
+use super::attributes::{AttributeForms, carried, corrected};
 use super::form::{Form, Least, Number, cross, dot, plus};
 use super::{
     BOUNDARY_WEIGHT, Cost, Evaluation, LANES, LINE_WEIGHT, between, boundary_weight, crease_weight,
@@ -15,7 +15,7 @@ use crate::decimate::queue::LazyHeap;
 use crate::decimate::surface::{Merged, Surface};
 use crate::decimate::symmetric::Symmetric;
 use crate::decimate::wedges::Carried;
-use crate::mesh::{Collapse, EdgeId, EdgeStore, FaceId, VertexId};
+use crate::mesh::{BUSY, Collapse, EdgeId, EdgeStore, FaceId, VertexId};
 use crate::progress::{self, Meter};
 
 /// The squared distances from the planes and lines that have met at a vertex: yᵀAy − 2bᵀy + c with
@@ -126,6 +126,46 @@ impl Accumulated {
             (part(quadrics, 0), part(quadrics, 4), part(quadrics, 6));
         [a, b, c, d, e, f, g, h, i, j]
     }
+
+    /// [`costs`](Cost::costs); `add` adds what is not of planes and lines.
+    #[inline(always)]
+    fn together<S: EdgeStore>(
+        &self,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+        add: impl FnOnce(&mut Form<f32x4>),
+    ) -> [f32; LANES] {
+        let tails = each(*edges, |e| surface.mesh.tail(e));
+        let heads = each(*edges, |e| surface.mesh.head(e));
+        let scale = f32x4::splat(surface.geometry.scale() as f32);
+        let along = between(&places(surface, tails), &places(surface, heads), scale);
+        let (at_tail, at_head) = (self.numbers(tails), self.numbers(heads));
+        let least = least(&at_tail, &at_head, along, self.placement, add);
+        least.costs().to_array()
+    }
+
+    /// [`costs`](Cost::costs), apart from where there are no attributes, which it would slow down.
+    #[inline(never)]
+    fn with_attributes<S: EdgeStore>(
+        &self,
+        attributes: &AttributeForms,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+    ) -> [f32; LANES] {
+        let alone = |e| {
+            let evaluation = self.evaluate(surface, e, [false; 2]);
+            evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
+        };
+        if edges[1..] == [edges[0]; LANES - 1] {
+            // Most edges are popped alone, and four lanes are more work than one number.
+            return [alone(edges[0]); LANES];
+        }
+        let mut is_too_much = [false; LANES];
+        let costs = self.together(surface, edges, |form| {
+            is_too_much = attributes.add_to_lanes(form, surface, edges);
+        });
+        corrected(costs, is_too_much, edges, alone)
+    }
 }
 
 impl<S: EdgeStore> Cost<S> for Accumulated {
@@ -229,19 +269,10 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
-        if self.attributes.is_some() {
-            return edges.map(|e| {
-                let evaluation = self.evaluate(surface, e, [false; 2]);
-                evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
-            });
+        match &self.attributes {
+            None => self.together(surface, edges, |_| {}),
+            Some(attributes) => self.with_attributes(attributes, surface, edges),
         }
-        let tails = each(*edges, |e| surface.mesh.tail(e));
-        let heads = each(*edges, |e| surface.mesh.head(e));
-        let scale = f32x4::splat(surface.geometry.scale() as f32);
-        let along = between(&places(surface, tails), &places(surface, heads), scale);
-        let (at_tail, at_head) = (self.numbers(tails), self.numbers(heads));
-        let least = least(&at_tail, &at_head, along, self.placement, |_| {});
-        least.costs().to_array()
     }
 
     fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried {
@@ -268,8 +299,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
         changed.clear();
         if let Some(attributes) = &mut self.attributes {
             list_touched(&surface.mesh, merged, changed);
-            changed.retain(|&x| !surface.mesh.is_busy(x));
-            attributes.update(surface, changed);
+            attributes.update(surface, changed, BUSY);
             changed.clear();
         }
     }
@@ -290,7 +320,7 @@ impl<S: EdgeStore> Cost<S> for Accumulated {
             changed.extend(around.flat_map(|&v| surface.mesh.neighbours(v)));
             changed.sort_unstable();
             changed.dedup();
-            attributes.update(surface, changed);
+            attributes.update(surface, changed, usize::MAX);
             changed.clear();
         }
         changed.extend(cut.as_flattened());

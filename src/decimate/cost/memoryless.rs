@@ -7,7 +7,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::attributes::{AttributeForms, carried};
+use super::attributes::{AttributeForms, carried, corrected};
 use super::form::{Factor, Form, Lanes, Least, Number, Vector, cross, dot, minus, plus};
 use super::star::Star;
 use super::{
@@ -121,6 +121,89 @@ impl Memoryless {
                 left: every,
             }
         })
+    }
+
+    /// [`costs`](Cost::costs); `add` adds what is not of planes and lines.
+    #[inline(always)]
+    fn together<S: EdgeStore>(
+        &self,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+        add: impl FnOnce(&mut Form<Lanes>),
+    ) -> [f32; LANES] {
+        let tails = each(*edges, |e| surface.mesh.tail(e));
+        let heads = each(*edges, |e| surface.mesh.head(e));
+        let at_tails = each(tails, |v| &self.tensors[v.index()]);
+        let at_heads = each(heads, |v| &self.tensors[v.index()]);
+        let any_is_heavy =
+            |tensors: [&Tensor; LANES]| tensors.iter().fold(false, |any, t| any | t.is_heavy());
+        if any_is_heavy(at_tails) | any_is_heavy(at_heads) {
+            return self.one_by_one(surface, edges);
+        }
+        let [a, b, c, d] = *edges;
+        let (Some(a), Some(b), Some(c), Some(d)) = (
+            apexes(surface, a),
+            apexes(surface, b),
+            apexes(surface, c),
+            apexes(surface, d),
+        ) else {
+            return self.one_by_one(surface, edges);
+        };
+        let apexes = [a, b, c, d];
+        let scale = Lanes::splat(surface.geometry.scale() as f32);
+        let along = between(&places(surface, tails), &places(surface, heads), scale);
+        let from = places(surface, each(apexes, |[_, b]| b));
+        let across = between(&from, &places(surface, each(apexes, |[a, _]| a)), scale);
+        let dying = Some(cross(&along, &across));
+        let (at_v, at_w) = (numbers(at_tails), numbers(at_heads));
+        let weight = if surface.weights.is_empty() {
+            Lanes::splat(1.0)
+        } else {
+            let [tails, heads] = [tails, heads].map(|ends| ends.map(|v| surface.weight(v) as f32));
+            Lanes::new(tails).fast_max(Lanes::new(heads))
+        };
+        let precision = match self.placement {
+            Placement::Optimal => SINGLE,
+            // Nothing is better than the better end.
+            Placement::Endpoint => Precision {
+                as_good: f64::INFINITY,
+                ..SINGLE
+            },
+        };
+        least(&at_v, &at_w, along, dying, weight, precision, add)
+            .costs()
+            .to_array()
+    }
+
+    /// [`costs`](Cost::costs), apart from where there are no attributes, which it would slow down.
+    #[inline(never)]
+    fn with_attributes<S: EdgeStore>(
+        &self,
+        attributes: &AttributeForms,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+    ) -> [f32; LANES] {
+        let mut is_too_much = [false; LANES];
+        let costs = self.together(surface, edges, |form| {
+            is_too_much = attributes.add_to_lanes(form, surface, edges);
+        });
+        corrected(costs, is_too_much, edges, |e| self.alone(surface, e))
+    }
+
+    /// [`costs`](Cost::costs), where an edge needs more than lanes have; seldom, and so kept out of the way.
+    #[cold]
+    fn one_by_one<S: EdgeStore>(
+        &self,
+        surface: &Surface<S>,
+        edges: &[EdgeId; LANES],
+    ) -> [f32; LANES] {
+        edges.map(|e| self.alone(surface, e))
+    }
+
+    /// What the collapse of an edge costs; no number where it says nothing.
+    fn alone<S: EdgeStore>(&self, surface: &Surface<S>, e: EdgeId) -> f32 {
+        let evaluation = self.evaluate(surface, e, [false; 2]);
+        evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
     }
 }
 
@@ -254,54 +337,10 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
 
     #[inline]
     fn costs(&self, surface: &Surface<S>, edges: &[EdgeId; LANES]) -> [f32; LANES] {
-        let tails = each(*edges, |e| surface.mesh.tail(e));
-        let heads = each(*edges, |e| surface.mesh.head(e));
-        let at_tails = each(tails, |v| &self.tensors[v.index()]);
-        let at_heads = each(heads, |v| &self.tensors[v.index()]);
-        let one_by_one = || {
-            edges.map(|e| {
-                let evaluation = self.evaluate(surface, e, [false; 2]);
-                evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32)
-            })
-        };
-        let any_is_heavy =
-            |tensors: [&Tensor; LANES]| tensors.iter().fold(false, |any, t| any | t.is_heavy());
-        if any_is_heavy(at_tails) | any_is_heavy(at_heads) | self.attributes.is_some() {
-            return one_by_one();
+        match &self.attributes {
+            None => self.together(surface, edges, |_| {}),
+            Some(attributes) => self.with_attributes(attributes, surface, edges),
         }
-        let [a, b, c, d] = *edges;
-        let (Some(a), Some(b), Some(c), Some(d)) = (
-            apexes(surface, a),
-            apexes(surface, b),
-            apexes(surface, c),
-            apexes(surface, d),
-        ) else {
-            return one_by_one();
-        };
-        let apexes = [a, b, c, d];
-        let scale = Lanes::splat(surface.geometry.scale() as f32);
-        let along = between(&places(surface, tails), &places(surface, heads), scale);
-        let from = places(surface, each(apexes, |[_, b]| b));
-        let across = between(&from, &places(surface, each(apexes, |[a, _]| a)), scale);
-        let dying = Some(cross(&along, &across));
-        let (at_v, at_w) = (numbers(at_tails), numbers(at_heads));
-        let weight = if surface.weights.is_empty() {
-            Lanes::splat(1.0)
-        } else {
-            let [tails, heads] = [tails, heads].map(|ends| ends.map(|v| surface.weight(v) as f32));
-            Lanes::new(tails).fast_max(Lanes::new(heads))
-        };
-        let precision = match self.placement {
-            Placement::Optimal => SINGLE,
-            // Nothing is better than the better end.
-            Placement::Endpoint => Precision {
-                as_good: f64::INFINITY,
-                ..SINGLE
-            },
-        };
-        least(&at_v, &at_w, along, dying, weight, precision, |_| {})
-            .costs()
-            .to_array()
     }
 
     fn carried(&self, surface: &Surface<S>, e: EdgeId, position: Vec3) -> Carried {
@@ -330,7 +369,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             !lags
         });
         if let Some(attributes) = &mut self.attributes {
-            attributes.update(surface, changed);
+            attributes.update(surface, changed, usize::MAX);
         }
         let is_exact = gained.is_some() || surface.mesh.face_count() < self.exact_below;
         let mut listed = 0;
@@ -371,7 +410,7 @@ impl<S: EdgeStore> Cost<S> for Memoryless {
             !lags
         });
         if let Some(attributes) = &mut self.attributes {
-            attributes.update(surface, changed);
+            attributes.update(surface, changed, usize::MAX);
         }
         for four in changed.chunks(LANES) {
             let now = self.tensors(surface, four);

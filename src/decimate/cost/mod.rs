@@ -9,7 +9,7 @@ mod memoryless;
 mod star;
 
 pub use accumulated::Accumulated;
-pub use attributes::AttributeForms;
+pub use attributes::{AttributeForms, stride as attribute_stride};
 pub use form::{LANES, cross, dot, minus};
 use form::{Lanes, Least, Vector};
 pub use memoryless::Memoryless;
@@ -178,6 +178,13 @@ fn list_touched<S: EdgeStore>(mesh: &Mesh<S>, merged: &Merged, touched: &mut Vec
 /// `map`, which the compiler leaves as a call where it should not.
 #[inline(always)]
 fn each<T, U>(four: [T; LANES], f: impl Fn(T) -> U) -> [U; LANES] {
+    let [a, b, c, d] = four;
+    [f(a), f(b), f(c), f(d)]
+}
+
+/// [`each`], of what stays where it is.
+#[inline(always)]
+fn each_ref<'a, T, U>(four: &'a [T; LANES], f: impl Fn(&'a T) -> U) -> [U; LANES] {
     let [a, b, c, d] = four;
     [f(a), f(b), f(c), f(d)]
 }
