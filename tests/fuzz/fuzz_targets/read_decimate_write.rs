@@ -87,7 +87,10 @@ fn write_and_read(mesh: &IndexedMesh, way: u8) {
     let has_parts = is_gltf && attributes.groups.len() > 1;
     let may_copy = format == Format::Stl || has_parts || !attributes.channels.is_empty();
     assert!(copies == 0 || may_copy, "{copies} copies of vertices");
-    let is_far = mesh.origin().to_array() != [0.0; 3];
+    // The digits that tell a single from others may say something else in double precision.
+    let is_far = [mesh, &back]
+        .iter()
+        .any(|m| m.origin().to_array() != [0.0; 3]);
     let is_single = format == Format::Stl && !options.ascii;
     // Positions relative to an origin, or that lose it, have the precision of what they span.
     let span = |mesh: &IndexedMesh| {
