@@ -104,10 +104,11 @@ impl Load {
         let words = match options.attributes {
             AttributeUse::Ignore => 0,
             AttributeUse::Carry => words + attributes.wedge_count() * numbers,
-            AttributeUse::Optimize => {
+            AttributeUse::Optimize if attributes.wedge_count() > 0 => {
                 let rows = numbers + super::cost::attribute_stride(numbers);
                 words + attributes.wedge_count() * rows + mesh.positions().len().div_ceil(4)
             }
+            AttributeUse::Optimize => words,
         };
         Self {
             vertices: mesh.positions().len(),
