@@ -253,7 +253,9 @@ impl Least<f64> {
             }
         });
         let cost = energy.max(0.0) + TIE_BREAK * self.length_squared;
-        (cost.is_finite() && position.is_finite()).then_some(Evaluation { cost, position })
+        // A candidate holds its cost in single precision, which attributes may go beyond.
+        let is_finite = (cost as f32).is_finite() && position.is_finite();
+        is_finite.then_some(Evaluation { cost, position })
     }
 }
 
