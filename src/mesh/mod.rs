@@ -60,7 +60,8 @@ pub use disk::Disks;
 pub use ids::{EdgeId, FaceId, VertexId};
 pub use link::{Opposite, Outgoing, RowId};
 pub use orient::{Oriented, turn_round};
-pub use ring::{BUSY, BoundaryCurve, Fan};
+pub(crate) use ring::BUSY;
+pub use ring::{BoundaryCurve, Fan};
 pub use store::{EdgeStore, Full, Medium, Small, Tier};
 pub use vertex_split::VertexSplit;
 

@@ -7,7 +7,7 @@ use super::{EdgeId, EdgeStore, FaceId, Mesh, VertexId};
 use smallvec::SmallVec;
 
 /// The faces of a busy vertex, and more.
-pub const BUSY: usize = 192;
+pub(crate) const BUSY: usize = 192;
 
 /// The outgoing edges of one fan, in the order of the walk `e → opposite(prev(e))`.
 ///
