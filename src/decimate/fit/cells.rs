@@ -14,6 +14,9 @@ const FEWEST: usize = 24;
 /// A triangle that reaches farther from its centroid, in cells, is kept aside.
 const REACH: f64 = 0.25;
 
+/// The bits of a cell's code that are of its first axis. Those of an axis alone order cells along it.
+const AXIS: u32 = 0x0924_9249;
+
 /// Triangles by the cells that their centroids lie in.
 pub struct Cells {
     grid: Grid,
@@ -133,22 +136,38 @@ impl Cells {
         let reach = Vec3::splat((REACH * side) as f32);
         seen.bits.resize(1 << (3 * self.bits).max(6) >> 6, 0);
         let mut cells = Vec::new();
+        let mut meet = |cell: u32| {
+            let word = &mut seen.bits[cell as usize >> 6];
+            let bit = 1 << (cell & 63);
+            if *word & bit == 0 {
+                *word |= bit;
+                cells.push(cell);
+            }
+        };
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for [min, max] in boxes {
             (low, high) = (low.min(min), high.max(max));
             let (min, max) = (min - reach, max + reach);
             let shift = AXIS_BITS - self.bits;
             let [first, last] = [min, max].map(|p| self.grid.cell(p).map(|c| c >> shift));
+            let sides = [0, 1, 2].map(|k| last[k] as usize + 1 - first[k] as usize);
+            if sides.into_iter().product::<usize>() > self.occupied.len() {
+                // Of a vertex far away all else lies in a few of very many cells.
+                let [first, last] = [first, last].map(Grid::code_of);
+                let is_between = |cell: u32| {
+                    let mut axes = [0, 1, 2].into_iter().map(|k| AXIS << k);
+                    axes.all(|axis| (first & axis..=last & axis).contains(&(cell & axis)))
+                };
+                let occupied = self.occupied.iter().map(|o| o.0);
+                occupied
+                    .filter(|&cell| is_between(cell))
+                    .for_each(&mut meet);
+                continue;
+            }
             for z in first[2]..=last[2] {
                 for y in first[1]..=last[1] {
                     for x in first[0]..=last[0] {
-                        let cell = Grid::code_of([x, y, z]);
-                        let word = &mut seen.bits[cell as usize >> 6];
-                        let bit = 1 << (cell & 63);
-                        if *word & bit == 0 {
-                            *word |= bit;
-                            cells.push(cell);
-                        }
+                        meet(Grid::code_of([x, y, z]));
                     }
                 }
             }
@@ -201,6 +220,9 @@ mod tests {
         let cells = unheard(|meter| Cells::new(grid, triangles.len(), corners, meter));
         assert!(cells.bits > 1 && !cells.large.is_empty());
         let mut seen = Seen::default();
+        let all = [Vec3::splat(-9.0), Vec3::splat(9.0)];
+        let found = cells.near([all].into_iter(), &mut seen);
+        assert_eq!(found.len(), triangles.len());
         for i in 0..100 {
             let center = positions[i * 97];
             let size = Vec3::new(0.3, 0.02, 0.1) * (i % 10) as f32 * 0.3;
