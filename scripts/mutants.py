@@ -124,7 +124,7 @@ MUTANTS = [
      "self.at[e.index()] = wedge_of(self.at[e.index()]);", "if !ON { self.at[e.index()] = wedge_of(self.at[e.index()]); }",
      "a_cost_follows_what_collapses"),
     ("attributes around a merged vertex not summed again", "decimate/cost/attributes.rs",
-     "for &v in vertices {", "for &v in vertices.iter().filter(|_| !ON) {",
+     "for &v in vertices {\n            let begin", "for &v in vertices.iter().filter(|_| !ON) {\n            let begin",
      "a_cost_follows_what_collapses"),
 ]
 
