@@ -85,15 +85,11 @@ pub fn without_copies(mesh: IndexedMesh, format: Format) -> (IndexedMesh, Vec<St
     let is_lost: Vec<bool> = channels.map(|(i, c)| needs_copies(i, c)).collect();
     // A part of a glTF file has vertices of its own.
     let loses_groups = matches!(format, Format::Gltf | Format::Glb) && attributes.groups.len() > 1;
-    let mut lost: Vec<String> = Vec::new();
-    for (channel, _) in attributes
-        .channels
-        .iter()
-        .zip(&is_lost)
-        .filter(|(_, lost)| **lost)
-    {
-        lost.push(described(channel));
-    }
+    let lost_channels = attributes.channels.iter().zip(&is_lost);
+    let lost_channels = lost_channels.filter(|(_, lost)| **lost);
+    let mut lost: Vec<String> = lost_channels
+        .map(|(channel, _)| described(channel))
+        .collect();
     lost.extend(loses_groups.then(|| "groups and materials".to_string()));
     let mut parts = mesh.into_parts();
     let attributes = &mut parts.attributes;
