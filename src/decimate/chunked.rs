@@ -689,7 +689,7 @@ impl<S: EdgeStore, C: Cost<S>> Chunk<S, C> {
                 outcome.kept.push(Kept {
                     vertex: number(id),
                     position: surface.geometry.position(id),
-                    deviation: surface.deviation[v],
+                    deviation: surface.geometry.deviation(id),
                     weight: surface.weight(id) as f32,
                     is_locked: surface.is_locked(id),
                     state,

@@ -169,17 +169,14 @@ impl<V> Flat<V> {
             .filter(|(_, turned)| **turned)
             .for_each(|(edges, _)| edges.swap(0, 2));
         let double_sided = self.unpacked(faces, &[FaceFlags::DOUBLE_SIDED], false);
-        let mut deviation = self.deviation;
-        deviation.resize(mesh.vertex_slots(), 0.0);
         let surface = Surface {
             locked: self.locked,
             double_sided,
             curves: Curves::of(&mesh, creases, self.may_shift),
             weights: self.weights,
-            deviation,
             lost: 0.0,
             turned: was_turned,
-            geometry: Geometry::new(self.positions, room),
+            geometry: Geometry::with_deviations(self.positions, &self.deviation, room),
             wedges: self.wedges.into_wedges(&mesh, turned),
             mesh,
             seam: Vec::new(),
@@ -208,11 +205,12 @@ impl<S: EdgeStore> Surface<S> {
             geometry,
             mut locked,
             mut weights,
-            mut deviation,
             ..
         } = self;
         let vertices = mesh.compact().vertices;
-        let mut positions = geometry.into_positions();
+        let mut positions: Vec<Vec3> = geometry.positions().collect();
+        let mut deviation: Vec<f32> = geometry.deviations().collect();
+        drop(geometry);
         Compaction::retain(&vertices, &mut positions);
         Compaction::retain(&vertices, &mut locked);
         Compaction::retain(&vertices, &mut weights);

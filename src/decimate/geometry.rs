@@ -43,19 +43,47 @@ impl Room {
     }
 }
 
-/// Positions in the file's bits, and the room that they have.
+/// Where a vertex is, and how far that may be from the original: aligned, so that both are one load.
+#[derive(Clone, Copy)]
+#[repr(align(16))]
+struct Point([f32; 4]);
+
+impl Point {
+    #[inline(always)]
+    fn position(&self) -> Vec3 {
+        let [x, y, z, _] = self.0;
+        Vec3::new(x, y, z)
+    }
+}
+
+/// Positions in the file's bits, how far each may be from the original, and the room that they have.
 ///
 /// Differences are taken in `f64`, where they are exact, and then scaled by a power of two, which is
 /// exact too: so a mesh scaled by 2^k decimates to the same triangles.
 pub struct Geometry {
-    positions: Vec<Vec3>,
+    /// One a vertex slot.
+    points: Vec<Point>,
     room: Room,
 }
 
 impl Geometry {
-    /// The geometry of these positions, in a room.
+    /// The geometry of these positions, in a room; none is known to be away from the original.
     pub fn new(positions: Vec<Vec3>, room: Room) -> Self {
-        Self { positions, room }
+        let points = positions.into_iter().map(|p| Point([p.x, p.y, p.z, 0.0]));
+        Self {
+            points: points.collect(),
+            room,
+        }
+    }
+
+    /// The geometry of these positions with an estimate, in the unit box, of how far each is from the
+    /// original; 0 behind the last estimate.
+    pub fn with_deviations(positions: Vec<Vec3>, deviations: &[f32], room: Room) -> Self {
+        let mut geometry = Self::new(positions, room);
+        for (point, &deviation) in geometry.points.iter_mut().zip(deviations) {
+            point.0[3] = deviation;
+        }
+        geometry
     }
 
     /// The room of the whole.
@@ -66,22 +94,41 @@ impl Geometry {
     /// The stored position of `v`.
     #[inline(always)]
     pub fn position(&self, v: VertexId) -> Vec3 {
-        self.positions[v.index()]
+        self.points[v.index()].position()
     }
 
     /// Moves `v`.
+    #[inline(always)]
     pub fn set_position(&mut self, v: VertexId, position: Vec3) {
-        self.positions[v.index()] = position;
+        self.points[v.index()].0[..3].copy_from_slice(&position.to_array());
+    }
+
+    /// How far `v` may be from the original, in the unit box.
+    #[inline(always)]
+    pub fn deviation(&self, v: VertexId) -> f32 {
+        self.points[v.index()].0[3]
+    }
+
+    /// Sets how far `v` may be from the original, in the unit box.
+    #[inline(always)]
+    pub fn set_deviation(&mut self, v: VertexId, deviation: f32) {
+        self.points[v.index()].0[3] = deviation;
+    }
+
+    /// The stored position of `v`, and a fourth number that says nothing of it.
+    #[inline(always)]
+    pub fn point(&self, v: VertexId) -> [f32; 4] {
+        self.points[v.index()].0
     }
 
     /// The positions, one a vertex slot.
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
+    pub fn positions(&self) -> impl Iterator<Item = Vec3> {
+        self.points.iter().map(Point::position)
     }
 
-    /// The positions, one a vertex slot.
-    pub fn into_positions(self) -> Vec<Vec3> {
-        self.positions
+    /// The deviations, one a vertex slot.
+    pub fn deviations(&self) -> impl Iterator<Item = f32> {
+        self.points.iter().map(|p| p.0[3])
     }
 
     /// Unit-box lengths per model unit: a power of two.
@@ -121,9 +168,14 @@ impl Geometry {
             .cross(self.vector(p, mesh.apex(e)))
     }
 
-    /// The bytes that the positions hold.
-    pub fn bytes(&self) -> usize {
-        self.positions.capacity() * size_of::<Vec3>()
+    /// The bytes that the positions hold, without the deviations beside them.
+    pub fn position_bytes(&self) -> usize {
+        self.points.capacity() * size_of::<Vec3>()
+    }
+
+    /// The bytes that the deviations hold.
+    pub fn deviation_bytes(&self) -> usize {
+        self.points.capacity() * size_of::<f32>()
     }
 }
 

@@ -440,9 +440,9 @@ impl Job<'_> {
                 return Ok((surface, stopped));
             }
             let forms = AttributeForms::new(&surface);
-            let before = forms
+            let before: Option<Vec<Vec3>> = forms
                 .as_ref()
-                .map(|_| surface.geometry.positions().to_vec());
+                .map(|_| surface.geometry.positions().collect());
             let bytes = fit_to_original(&mut surface, original, &terms, meter)?;
             if let (Some(forms), Some(before)) = (forms, before) {
                 forms.follow(&mut surface, &before);

@@ -1,7 +1,7 @@
 //! What a collapse must not do to the faces around it, and how far it may move away from them.
 
 use glam::Vec3;
-use wide::f32x4;
+use wide::{f32x4, i32x4};
 
 use super::cost::{cross, dot, minus};
 use super::geometry::Geometry;
@@ -14,15 +14,14 @@ const THIN: f32 = 1e-6;
 /// Faces that are looked at together.
 const LANES: usize = 4;
 
-/// Faces of a fan that are gathered at a time.
-const GATHERED: usize = 4 * LANES;
+/// Faces of a fan that are gathered at a time: all around an end of [`Disks`].
+const GATHERED: usize = 20;
 
 /// The largest distance of `position` from the planes of the faces and the lines of the boundary
 /// edges at both ends of `e`, in the unit box; nothing where a face that stays would turn by 90° or
 /// more, or lose its area, if the ends moved there.
 ///
 /// Costs one walk around each end that moves.
-#[inline]
 pub fn distance_from_star<S: EdgeStore>(
     mesh: &Mesh<S>,
     geometry: &Geometry,
@@ -30,31 +29,31 @@ pub fn distance_from_star<S: EdgeStore>(
     position: Vec3,
 ) -> Option<f32> {
     let [v, w] = mesh.edge_vertices(e);
-    let mut faces = Faces::new(geometry);
+    let mut faces = Faces::new(geometry, position);
     let mut from_lines = 0.0f32;
     for (end, other) in [(v, w), (w, v)] {
         let point = geometry.position(end);
         if point == position {
             continue;
         }
-        let offset = geometry.scaled(position - point);
+        faces.of(end, other);
         for start in mesh.fans(end) {
             let from_line = |e: EdgeId, neighbour: VertexId| {
                 if mesh.opposite(e) == Opposite::Boundary {
                     let along = geometry.scaled(geometry.position(neighbour) - point);
-                    distance_squared_from_line(along, offset)
+                    distance_squared_from_line(along, geometry.scaled(position - point))
                 } else {
                     0.0
                 }
             };
             let first = mesh.head(start);
             let at_first = from_line(start, first);
-            faces.begin(point, offset, geometry.position(first), first == other);
+            (faces.rim[0], faces.count) = (first, 0);
             let mut last = (start, first);
             for d in mesh.fan(start) {
                 let before = mesh.prev(d);
                 let apex = mesh.tail(before);
-                faces.add(geometry.position(apex), apex == other)?;
+                faces.add(apex)?;
                 last = (before, apex);
             }
             faces.look()?;
@@ -67,29 +66,23 @@ pub fn distance_from_star<S: EdgeStore>(
 /// [`distance_from_star`] of an edge between two disks.
 #[inline]
 pub fn distance_from_disks(geometry: &Geometry, disks: &Disks, position: Vec3) -> Option<f32> {
-    let mut faces = Faces::new(geometry);
+    let mut faces = Faces::new(geometry, position);
     let [v, w] = disks.ends();
     let [x, y] = disks.apexes();
     let mut has_seen_dying = false;
     for (side, end, other, last) in [(0, v, w, y), (1, w, v, x)] {
-        let point = geometry.position(end);
-        if point == position {
+        if geometry.position(end) == position {
             continue;
         }
-        let mut around = disks.around(side).iter();
-        let offset = geometry.scaled(position - point);
-        if has_seen_dying {
-            let first = around.next().map_or(last, |&first| first);
-            faces.begin(point, offset, geometry.position(first), false);
-        } else {
-            faces.begin(point, offset, geometry.position(other), true);
-        }
-        for &v in around {
-            faces.add(geometry.position(v), false)?;
-        }
-        faces.add(geometry.position(last), false)?;
+        faces.of(end, other);
+        let (around, count) = disks.around_and_rest(side);
+        faces.rim[..around.len()].copy_from_slice(around);
+        faces.rim[count] = last;
+        faces.count = count;
         if !has_seen_dying {
-            faces.add(geometry.position(other), true)?;
+            faces.rim[count + 1] = other;
+            faces.rim[count + 2] = around[0];
+            faces.count += 2;
         }
         faces.look()?;
         has_seen_dying = true;
@@ -108,65 +101,57 @@ fn distance_squared_from_line(along: Vec3, offset: Vec3) -> f32 {
 
 /// The faces of a fan around a vertex that moves: face i lies between the vertices i and i + 1 of
 /// the rim.
-struct Faces {
+struct Faces<'a> {
+    geometry: &'a Geometry,
+    position: Vec3,
     point: Vec3,
-    offset: Vec3,
-    scale: f32,
-    /// The coordinates of each vertex on the rim; and 1 where it is the edge's other end, so that the
-    /// faces there go, else 0. Stored and loaded whole, or a load would wait for four stores.
-    rim: [[f32; 4]; GATHERED + LANES],
+    /// The edge's other end: the faces there go.
+    other: VertexId,
+    rim: [VertexId; GATHERED + LANES],
     count: usize,
     /// The largest squared distance from their planes so far, in each lane.
     squared: f32x4,
 }
 
-impl Faces {
+impl<'a> Faces<'a> {
     #[inline(always)]
-    fn new(geometry: &Geometry) -> Self {
+    fn new(geometry: &'a Geometry, position: Vec3) -> Self {
         Self {
-            point: Vec3::ZERO,
-            offset: Vec3::ZERO,
-            scale: geometry.scale() as f32,
-            rim: [[0.0; 4]; GATHERED + LANES],
+            geometry,
+            position,
+            point: position,
+            other: VertexId::new(0),
+            rim: [VertexId::new(0); GATHERED + LANES],
             count: 0,
             squared: f32x4::ZERO,
         }
     }
 
+    /// Those of an end that moves.
     #[inline(always)]
-    fn put(&mut self, i: usize, position: Vec3, is_other: bool) {
-        let mark = if is_other { 1.0 } else { 0.0 };
-        self.rim[i.min(GATHERED)] = [position.x, position.y, position.z, mark];
-    }
-
-    /// A fan around a vertex at `point` that moves by `offset`, and the first vertex on its rim.
-    #[inline(always)]
-    fn begin(&mut self, point: Vec3, offset: Vec3, position: Vec3, is_other: bool) {
-        (self.point, self.offset, self.count) = (point, offset, 0);
-        self.put(0, position, is_other);
+    fn of(&mut self, end: VertexId, other: VertexId) {
+        (self.point, self.other) = (self.geometry.position(end), other);
     }
 
     /// The next vertex on the rim, and so a face. Nothing where one before it turns.
-    #[inline(always)]
-    fn add(&mut self, position: Vec3, is_other: bool) -> Option<()> {
+    fn add(&mut self, vertex: VertexId) -> Option<()> {
         if self.count == GATHERED {
             self.look()?;
             self.rim[0] = self.rim[GATHERED];
             self.count = 0;
         }
         self.count += 1;
-        self.put(self.count, position, is_other);
+        self.rim[self.count] = vertex;
         Some(())
     }
 
-    /// Four vertices of the rim, as seen from the point, in the unit box; and the marks.
+    /// Four points, as seen from the one that moves, in the unit box.
     #[inline(always)]
-    fn vertices(&self, first: usize) -> [f32x4; 4] {
-        let [x, y, z] = self.point.to_array();
-        let four: &[_; LANES] = self.rim[first..].first_chunk().expect("as many");
-        let [a, b, c, marks] = f32x4::transpose(four.map(f32x4::new));
-        let from = |four, origin| (four - f32x4::splat(origin)) * f32x4::splat(self.scale);
-        [from(a, x), from(b, y), from(c, z), marks]
+    fn seen(&self, points: [f32x4; LANES]) -> [f32x4; 3] {
+        let [x, y, z] = self.point.to_array().map(f32x4::splat);
+        let scale = f32x4::splat(self.geometry.scale() as f32);
+        let [a, b, c, _] = f32x4::transpose(points);
+        [(a - x) * scale, (b - y) * scale, (c - z) * scale]
     }
 
     /// The largest distance from the planes of those looked at.
@@ -179,13 +164,22 @@ impl Faces {
     /// Looks at the faces gathered. Nothing where one turns.
     #[inline(always)]
     fn look(&mut self) -> Option<()> {
-        // The lanes behind the last face hold faces that go.
-        let last = self.count.min(GATHERED);
-        let [x, y, z, _] = self.rim[last];
-        self.rim[last + 1..last + LANES].fill([x, y, z, 1.0]);
-        for first in (0..last).step_by(LANES) {
-            let (from, to) = (self.vertices(first), self.vertices(first + 1));
-            let squared = distance_squared(&from, &to, self.offset)?;
+        // The lanes behind the last face hold faces without area.
+        let last = self.rim[self.count];
+        self.rim[self.count + 1..][..LANES - 1].fill(last);
+        let offset = self.geometry.scaled(self.position - self.point);
+        for first in (0..self.count).step_by(LANES) {
+            let &[a, b, c, d, e] = self.rim[first..].first_chunk().expect("as many");
+            let at = |v| f32x4::new(self.geometry.point(v));
+            let [p, q, r, s, t] = [at(a), at(b), at(c), at(d), at(e)];
+            let (from, to) = (self.seen([p, q, r, s]), self.seen([q, r, s, t]));
+            let is_other = |[a, b, c, d]: [VertexId; LANES]| {
+                let id = |v: VertexId| v.index() as i32;
+                let ids = i32x4::new([id(a), id(b), id(c), id(d)]);
+                ids.simd_eq(i32x4::splat(id(self.other)))
+            };
+            let goes = f32x4::from_i32x4(is_other([a, b, c, d]) | is_other([b, c, d, e]));
+            let squared = distance_squared(&from, &to, goes, offset)?;
             self.squared = self.squared.fast_max(squared);
         }
         Some(())
@@ -193,19 +187,22 @@ impl Faces {
 }
 
 /// The squared distances of the place that the vertex moves to, by `offset`, from the planes of the
-/// faces between it and `from` and `to`; nothing where one of the faces turns.
+/// faces between it and `a` and `b`; nothing where one of the faces turns that does not go.
 #[inline(always)]
-fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<f32x4> {
-    let ([ax, ay, az, a_is_other], [bx, by, bz, b_is_other]) = (*from, *to);
-    let (a, b) = ([ax, ay, az], [bx, by, bz]);
+fn distance_squared(
+    a: &[f32x4; 3],
+    b: &[f32x4; 3],
+    goes: f32x4,
+    offset: Vec3,
+) -> Option<f32x4> {
     let offset = offset.to_array().map(f32x4::splat);
-    let rim = minus(&b, &a);
-    let normal = cross(&a, &rim);
+    let rim = minus(b, a);
+    let normal = cross(a, &rim);
     let area_squared = dot(&normal, &normal);
     let along = dot(&normal, &offset);
     let has_area = area_squared.simd_gt(f32x4::ZERO);
     let squared = has_area & (along * along / area_squared);
-    let (a_after, b_after) = (minus(&a, &offset), minus(&b, &offset));
+    let (a_after, b_after) = (minus(a, &offset), minus(b, &offset));
     let after = cross(&a_after, &rim);
     let rim_squared = dot(&rim, &rim);
     let is_thin = |area_squared: f32x4, a: &[f32x4; 3], b: &[f32x4; 3]| {
@@ -215,8 +212,7 @@ fn distance_squared(from: &[f32x4; 4], to: &[f32x4; 4], offset: Vec3) -> Option<
     };
     let turns = dot(&normal, &after).simd_le(f32x4::ZERO)
         | is_thin(dot(&after, &after), &a_after, &b_after);
-    let stays = (a_is_other + b_is_other).simd_eq(f32x4::ZERO);
-    let turns = turns & stays;
-    let is_turned = turns.any() && (turns & !is_thin(area_squared, &a, &b)).any();
+    let turns = turns & goes.simd_eq(f32x4::ZERO);
+    let is_turned = turns.any() && (turns & !is_thin(area_squared, a, b)).any();
     (!is_turned).then_some(squared)
 }

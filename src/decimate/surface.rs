@@ -53,7 +53,7 @@ pub struct Loss {
 pub struct Surface<S> {
     /// Which triangles meet where.
     pub mesh: Mesh<S>,
-    /// Where the vertices are.
+    /// Where the vertices are, and an estimate of how far each is from the original.
     pub geometry: Geometry,
     /// One flag a vertex that must not move, or nothing where all may.
     pub locked: Vec<bool>,
@@ -67,8 +67,6 @@ pub struct Surface<S> {
     pub wedges: Wedges,
     /// What the cost is multiplied by around each vertex, or nothing where by 1.
     pub weights: Vec<f32>,
-    /// An estimate of how far each vertex is from the original, in the unit box.
-    pub deviation: Vec<f32>,
     /// One flag a vertex that has faces elsewhere, so that no edge at it collapses here, or nothing
     /// where all faces are here.
     pub seam: Vec<bool>,
@@ -271,7 +269,7 @@ impl<S: EdgeStore> Surface<S> {
         if !self.wedges.is_empty() {
             self.wedges.adopt(&self.mesh, collapse.kept, &plan.carried);
         }
-        self.deviation[collapse.kept.index()] = plan.deviation;
+        self.geometry.set_deviation(collapse.kept, plan.deviation);
         Merged {
             collapse,
             from,
@@ -336,7 +334,8 @@ impl<S: EdgeStore> Surface<S> {
         }
         for ((old, new), place) in tails.into_iter().zip(vertices).zip(places) {
             self.geometry.set_position(new, place);
-            self.deviation[new.index()] = self.deviation[old.index()];
+            let deviation = self.geometry.deviation(old);
+            self.geometry.set_deviation(new, deviation);
             if !self.weights.is_empty() {
                 self.weights[new.index()] = self.weights[old.index()];
             }
@@ -404,7 +403,7 @@ impl<S: EdgeStore> Surface<S> {
     #[inline]
     pub fn deviation_after(&self, e: EdgeId, way: &Way, position: Vec3) -> Option<f32> {
         let [v, w] = self.mesh.edge_vertices(e);
-        let deviation = self.deviation[v.index()].max(self.deviation[w.index()]);
+        let deviation = self.geometry.deviation(v).max(self.geometry.deviation(w));
         let moved = match way {
             Way::Collapse(Some(disks)) => {
                 rules::distance_from_disks(&self.geometry, disks, position)
@@ -416,7 +415,7 @@ impl<S: EdgeStore> Surface<S> {
 
     /// The largest estimated distance from the original, in the unit box.
     pub fn max_deviation(&self) -> f64 {
-        let deviations = self.mesh.vertices().map(|v| self.deviation[v.index()]);
+        let deviations = self.mesh.vertices().map(|v| self.geometry.deviation(v));
         f64::from(deviations.fold(0.0, f32::max)).max(self.lost)
     }
 
@@ -454,7 +453,7 @@ impl<S: EdgeStore> Surface<S> {
 
     /// The bytes of connectivity and positions.
     pub fn mesh_bytes(&self) -> usize {
-        self.mesh.bytes() + self.geometry.bytes()
+        self.mesh.bytes() + self.geometry.position_bytes()
     }
 
     /// The bytes of what is carried along.
@@ -464,6 +463,7 @@ impl<S: EdgeStore> Surface<S> {
             + self.double_sided.capacity()
             + self.curves.bytes()
             + self.wedges.bytes()
-            + (self.weights.capacity() + self.deviation.capacity()) * size_of::<f32>()
+            + self.weights.capacity() * size_of::<f32>()
+            + self.geometry.deviation_bytes()
     }
 }

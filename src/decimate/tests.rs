@@ -478,12 +478,12 @@ fn how_far_an_end_was_is_added<S: EdgeStore>() {
                     continue;
                 };
                 for far in ends {
-                    surface.deviation[far.index()] = 0.25;
+                    surface.geometry.set_deviation(far, 0.25);
                     assert_eq!(
                         surface.deviation_after(e, way, position),
                         Some(0.25 + moved)
                     );
-                    surface.deviation[far.index()] = 0.0;
+                    surface.geometry.set_deviation(far, 0.0);
                 }
                 *found += 1;
             }

@@ -46,6 +46,12 @@ impl Disks {
         &self.around[end][..self.counts[end].min(FEW)]
     }
 
+    /// [`around`](Self::around), with places left over behind as many as this says.
+    #[inline(always)]
+    pub fn around_and_rest(&self, end: usize) -> (&[VertexId; FEW], usize) {
+        (&self.around[end], self.counts[end].min(FEW))
+    }
+
     /// The apexes of the edge's two faces: what comes first around the tail, and around the head.
     #[inline(always)]
     pub fn apexes(&self) -> [VertexId; 2] {

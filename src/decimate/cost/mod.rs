@@ -209,10 +209,7 @@ fn part<const N: usize>(lists: [&[f32; N]; LANES], first: usize) -> [Lanes; 4] {
 /// The coordinates of vertices.
 #[inline(always)]
 fn places<S: EdgeStore>(surface: &Surface<S>, vertices: [VertexId; LANES]) -> Vector<Lanes> {
-    let place = |v| {
-        let [x, y, z] = surface.geometry.position(v).to_array();
-        Lanes::new([x, y, z, 0.0])
-    };
+    let place = |v| Lanes::new(surface.geometry.point(v));
     let [x, y, z, _] = Lanes::transpose(each(vertices, place));
     [x, y, z]
 }
@@ -275,7 +272,6 @@ mod tests {
             });
         Surface {
             mesh: Mesh::from_triangles(positions.len(), &triangles),
-            deviation: vec![0.0; positions.len()],
             geometry: Geometry::new(positions, Room::around(corners)),
             locked: Vec::new(),
             double_sided: Vec::new(),

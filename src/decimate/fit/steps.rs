@@ -223,7 +223,7 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
         let vertices = self.surface.mesh.face_vertices(f);
         let [a, b, c] = vertices.map(|v| self.surface.geometry.position(v));
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
-        let deviations = vertices.map(|v| self.surface.deviation[v.index()]);
+        let deviations = vertices.map(|v| self.surface.geometry.deviation(v));
         let deviation = f64::from(deviations.into_iter().fold(0.0, f32::max)) / self.scale;
         let margin = (MARGIN * deviation as f32).min(WIDEST * (max - min).max_element());
         [min - margin, max + margin]
@@ -695,9 +695,9 @@ impl<'a, 'b, S: EdgeStore> Fit<'a, 'b, S> {
     /// Replaces the estimated deviation of every vertex by what was measured around it: where pieces
     /// meet, before or after the last step.
     pub(super) fn finish(self) {
-        let deviations = self.surface.deviation.iter_mut();
-        for (deviation, squared) in deviations.zip(self.measured) {
-            *deviation = squared.sqrt();
+        for (v, squared) in self.measured.into_iter().enumerate() {
+            let v = VertexId::new(v);
+            self.surface.geometry.set_deviation(v, squared.sqrt());
         }
     }
 
