@@ -199,19 +199,23 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     fn queue_all(&mut self, only_possible: bool, meter: &mut Meter) -> progress::Result<bool> {
         let slots = self.surface.mesh.face_slots();
         let evaluate = |greedy: &Self, first: usize, found: &mut Vec<Candidate>| {
-            let mesh = &greedy.surface.mesh;
-            let mut names = Vec::with_capacity(3 * PART_FACES);
+            let (surface, mesh) = (&greedy.surface, &greedy.surface.mesh);
+            // Half of the edges have another name, at random: no branch would foresee which.
+            let mut names = vec![EdgeId::new(0); 3 * PART_FACES + 1];
+            let mut count = 0;
             for f in (first..slots.min(first + PART_FACES)).map(FaceId::new) {
-                if !mesh.is_live_face(f) {
-                    continue;
-                }
-                for e in f.edges() {
-                    if mesh.canonical(e) == e {
-                        names.push(e);
+                if mesh.is_live_face(f) {
+                    for e in f.edges() {
+                        names[count] = e;
+                        count += usize::from(mesh.is_canonical(e));
                     }
                 }
             }
-            greedy.evaluate_all(&names, found);
+            names.truncate(count);
+            let (cost, may_fill) = (&greedy.cost, greedy.may_simplify());
+            evaluate_all(surface, cost, may_fill, names.into_iter(), |candidate| {
+                found.push(candidate);
+            });
             if only_possible {
                 found.retain(|c| greedy.is_possible(c.edge));
             }
@@ -401,16 +405,14 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     /// Evaluates the edges that were popped, and queues them at what they cost now.
     #[inline]
     fn evaluate_pending(&mut self) {
-        let mut pending = std::mem::take(&mut self.pending);
-        let mut found = std::mem::take(&mut self.found);
+        let may_fill = self.may_simplify();
+        let (surface, queue) = (&self.surface, &mut self.queue);
         // Some may have gone since.
-        pending.retain(|e| self.surface.mesh.is_live_face(e.face()));
-        self.evaluate_all(&pending, &mut found);
-        for candidate in found.drain(..) {
-            self.queue.push(candidate, Age::UpToDate);
-        }
-        pending.clear();
-        (self.pending, self.found) = (pending, found);
+        let pending = self.pending.drain(..);
+        let live = pending.filter(|e| surface.mesh.is_live_face(e.face()));
+        evaluate_all(surface, &self.cost, may_fill, live, |candidate| {
+            queue.push(candidate, Age::UpToDate);
+        });
     }
 
     /// Outdates the candidates of the edges at a merged vertex, and queues those that have none, at the
@@ -475,46 +477,14 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
         self.cost.evaluate(&self.surface, e, self.surface.held(e))
     }
 
-    /// Adds the candidates of edges to those found, in any order.
+    /// Queues edges at what they cost.
     #[inline]
-    fn evaluate_all(&self, edges: &[EdgeId], found: &mut Vec<Candidate>) {
+    fn queue_now(&mut self, edges: impl Iterator<Item = EdgeId>) {
         let may_fill = self.may_simplify();
-        let mut give = |edge: EdgeId, cost: f32| {
-            let price = may_fill.then(|| self.fill_price(edge)).flatten();
-            let cost = price.map_or(cost, |price| (price as f32).min(cost));
-            if cost.is_finite() {
-                found.push(Candidate { cost, edge });
-            }
-        };
-        let mut batch = [EdgeId::new(0); LANES];
-        let mut count = 0;
-        for &e in edges {
-            match self.surface.held(e) {
-                [false, false] => {
-                    batch[count] = e;
-                    count += 1;
-                }
-                [true, true] => give(e, f32::NAN),
-                held => {
-                    let evaluation = self.cost.evaluate(&self.surface, e, held);
-                    give(
-                        e,
-                        evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32),
-                    );
-                }
-            }
-            if count == LANES {
-                let costs = self.cost.costs(&self.surface, &batch);
-                (0..LANES).for_each(|i| give(batch[i], costs[i]));
-                count = 0;
-            }
-        }
-        if count > 0 {
-            let first = batch[0];
-            batch[count..].fill(first);
-            let costs = self.cost.costs(&self.surface, &batch);
-            (0..count).for_each(|i| give(batch[i], costs[i]));
-        }
+        let queue = &mut self.queue;
+        evaluate_all(&self.surface, &self.cost, may_fill, edges, |candidate| {
+            queue.push(candidate, Age::UpToDate);
+        });
     }
 
     /// Whether the topology may change here: not where creases are to be kept.
@@ -724,12 +694,8 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             self.free_vertices.push(merged.collapse.removed);
             for e in std::mem::take(&mut self.waiting) {
                 if self.surface.mesh.is_live_face(e.face()) {
-                    let mut found = Vec::new();
                     let name = self.surface.mesh.canonical(e);
-                    self.evaluate_all(&[name], &mut found);
-                    found
-                        .into_iter()
-                        .for_each(|c| self.queue.push(c, Age::UpToDate));
+                    self.queue_now(std::iter::once(name));
                 }
             }
         }
@@ -765,13 +731,8 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
                 }
             }
         }
-        let mut found = std::mem::take(&mut self.found);
-        self.evaluate_all(&edges, &mut found);
-        found
-            .drain(..)
-            .for_each(|candidate| self.queue.push(candidate, Age::UpToDate));
-        edges.clear();
-        (self.edges, self.found) = (edges, found);
+        self.queue_now(edges.drain(..));
+        self.edges = edges;
     }
 
     /// The name of the edge from the changed vertex `v` to `other`, unless it is `other`'s turn (both
@@ -838,6 +799,51 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             + self.surface.carried_bytes()
             + self.changed_at.capacity() * size_of::<u32>();
         self.tally.working_bytes = self.tally.working_bytes.max(bytes);
+    }
+}
+
+/// Gives the candidates of edges, in any order. Where gaps may be filled, an edge costs no more than that.
+#[inline]
+fn evaluate_all<S: EdgeStore, C: Cost<S>>(
+    surface: &Surface<S>,
+    cost: &C,
+    may_fill: bool,
+    edges: impl Iterator<Item = EdgeId>,
+    mut give: impl FnMut(Candidate),
+) {
+    let mut give = |edge: EdgeId, cost: f32| {
+        let price = may_fill.then(|| surface.fill_price(edge)).flatten();
+        let cost = price.map_or(cost, |price| (price as f32).min(cost));
+        if cost.is_finite() {
+            give(Candidate { cost, edge });
+        }
+    };
+    let mut batch = [EdgeId::new(0); LANES];
+    let mut count = 0;
+    for e in edges {
+        match surface.held(e) {
+            [false, false] => {
+                batch[count] = e;
+                count += 1;
+            }
+            [true, true] => give(e, f32::NAN),
+            held => {
+                let evaluation = cost.evaluate(surface, e, held);
+                let cost = evaluation.map_or(f32::NAN, |evaluation| evaluation.cost as f32);
+                give(e, cost);
+            }
+        }
+        if count == LANES {
+            let costs = cost.costs(surface, &batch);
+            (0..LANES).for_each(|i| give(batch[i], costs[i]));
+            count = 0;
+        }
+    }
+    if count > 0 {
+        let first = batch[0];
+        batch[count..].fill(first);
+        let costs = cost.costs(surface, &batch);
+        (0..count).for_each(|i| give(batch[i], costs[i]));
     }
 }
 

@@ -189,12 +189,7 @@ impl<'a> Faces<'a> {
 /// The squared distances of the place that the vertex moves to, by `offset`, from the planes of the
 /// faces between it and `a` and `b`; nothing where one of the faces turns that does not go.
 #[inline(always)]
-fn distance_squared(
-    a: &[f32x4; 3],
-    b: &[f32x4; 3],
-    goes: f32x4,
-    offset: Vec3,
-) -> Option<f32x4> {
+fn distance_squared(a: &[f32x4; 3], b: &[f32x4; 3], goes: f32x4, offset: Vec3) -> Option<f32x4> {
     let offset = offset.to_array().map(f32x4::splat);
     let rim = minus(b, a);
     let normal = cross(a, &rim);

@@ -180,6 +180,16 @@ impl<S: EdgeStore> Mesh<S> {
         }
     }
 
+    /// Whether `e` is the [name](Self::canonical) of its edge.
+    #[inline]
+    pub fn is_canonical(&self, e: EdgeId) -> bool {
+        match self.opposite(e) {
+            Opposite::Edge(o) => e < o,
+            Opposite::Boundary => true,
+            Opposite::NonManifold(row) => self.edge_rows.row(row)[0] == e,
+        }
+    }
+
     /// Whether exactly one face lies at `e`.
     pub fn is_boundary(&self, e: EdgeId) -> bool {
         self.opposite(e) == Opposite::Boundary
@@ -214,7 +224,7 @@ impl<S: EdgeStore> Mesh<S> {
     pub fn edges(&self) -> impl Iterator<Item = EdgeId> + '_ {
         self.faces()
             .flat_map(FaceId::edges)
-            .filter(|&e| self.canonical(e) == e)
+            .filter(|&e| self.is_canonical(e))
     }
 
     /// The vertices that have a face, ascending.
