@@ -422,17 +422,27 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
     fn complete(&mut self, merged: &Merged, way: &Way, cost: f32) {
         let mut edges = std::mem::take(&mut self.edges);
         let (mesh, queue) = (&self.surface.mesh, &mut self.queue);
+        // Edges that became one go by one name from now on; all others keep theirs.
+        for &e in &merged.collapse.merged_edges {
+            if let Opposite::Edge(o) = mesh.opposite(e) {
+                let (name, other) = (e.min(o), e.max(o));
+                if queue.contains(name) {
+                    queue.remove(other);
+                } else {
+                    queue.rename(other, name);
+                }
+            }
+        }
         let mut outdate = |e| {
-            if let Some(name) = outdated(mesh, queue, e) {
+            let name = mesh.canonical(e);
+            if !queue.outdate(name) {
                 edges.push(name);
             }
         };
         if let Some(gained) = &merged.gained {
             gained.iter().copied().for_each(outdate);
         } else if let Way::Collapse(Some(disks)) = way {
-            for of_end in disks.spokes() {
-                of_end.iter().copied().for_each(&mut outdate);
-            }
+            disks.spokes().into_iter().for_each(outdate);
         } else {
             for start in mesh.fans(merged.collapse.kept) {
                 let mut end = None;
@@ -845,22 +855,4 @@ fn evaluate_all<S: EdgeStore, C: Cost<S>>(
         let costs = cost.costs(surface, &batch);
         (0..count).for_each(|i| give(batch[i], costs[i]));
     }
-}
-
-/// Outdates the candidate of an edge, of two that it has the one by its name; its name, where it has
-/// none.
-#[inline(always)]
-fn outdated<S: EdgeStore, Q: Queue>(mesh: &Mesh<S>, queue: &mut Q, e: EdgeId) -> Option<EdgeId> {
-    let is_queued = match mesh.opposite(e) {
-        Opposite::Edge(o) => {
-            let are_queued = [queue.outdate(e), queue.outdate(o)];
-            if are_queued == [true; 2] {
-                queue.remove(e.max(o));
-            }
-            are_queued != [false; 2]
-        }
-        Opposite::Boundary => queue.outdate(e),
-        Opposite::NonManifold(_) => queue.outdate(mesh.canonical(e)),
-    };
-    (!is_queued).then(|| mesh.canonical(e))
 }

@@ -36,6 +36,10 @@ pub trait Queue: Send + Sync {
     /// Drops the candidate, if there is one.
     fn remove(&mut self, e: EdgeId);
 
+    /// The candidate of `old`, if there is one, goes by `new` from now on, which has none; and is out of
+    /// date. Whether there is one.
+    fn rename(&mut self, old: EdgeId, new: EdgeId) -> bool;
+
     /// The bytes that the queue holds.
     fn bytes(&self) -> usize;
 }
@@ -141,6 +145,16 @@ impl Queue for LazyHeap {
     fn remove(&mut self, e: EdgeId) {
         let before = std::mem::replace(&mut self.current[e.index()], NO_COST);
         self.candidates -= usize::from(before != NO_COST);
+    }
+
+    fn rename(&mut self, old: EdgeId, new: EdgeId) -> bool {
+        let bits = self.current[old.index()];
+        if bits != NO_COST {
+            self.remove(old);
+            let cost = f32::from_bits(bits & !OUT_OF_DATE);
+            self.push(Candidate { cost, edge: new }, Age::OutOfDate);
+        }
+        bits != NO_COST
     }
 
     fn bytes(&self) -> usize {
@@ -300,6 +314,16 @@ impl Queue for Buckets {
         self.places[e.index()] = NOWHERE;
     }
 
+    #[inline]
+    fn rename(&mut self, old: EdgeId, new: EdgeId) -> bool {
+        let place = std::mem::replace(&mut self.places[old.index()], NOWHERE);
+        if place != NOWHERE {
+            let cost = ceiling((place & !OUT_OF_DATE_MARK).into());
+            self.push(Candidate { cost, edge: new }, Age::OutOfDate);
+        }
+        place != NOWHERE
+    }
+
     fn bytes(&self) -> usize {
         self.room * size_of::<u32>()
             + self.lists.capacity() * size_of::<Vec<u32>>()
@@ -348,7 +372,15 @@ mod tests {
         let mut list: Vec<Option<(f32, Age)>> = vec![None; edges];
         for _ in 0..200_000 {
             let edge = random(edges as u64) as usize;
-            match random(9) {
+            match random(10) {
+                9 => {
+                    let other = random(edges as u64) as usize;
+                    if list[other].is_none() {
+                        let is_there = queue.rename(EdgeId::new(edge), EdgeId::new(other));
+                        assert_eq!(is_there, list[edge].is_some());
+                        list[other] = list[edge].take().map(|(cost, _)| (cost, Age::OutOfDate));
+                    }
+                }
                 8 => {
                     queue.remove(EdgeId::new(edge));
                     list[edge] = None;

@@ -69,23 +69,20 @@ pub fn distance_from_disks(geometry: &Geometry, disks: &Disks, position: Vec3) -
     let mut faces = Faces::new(geometry, position);
     let [v, w] = disks.ends();
     let [x, y] = disks.apexes();
-    let mut has_seen_dying = false;
-    for (side, end, other, last) in [(0, v, w, y), (1, w, v, x)] {
-        if geometry.position(end) == position {
-            continue;
-        }
-        faces.of(end, other);
-        let (around, count) = disks.around_and_rest(side);
-        faces.rim[..around.len()].copy_from_slice(around);
-        faces.rim[count] = last;
-        faces.count = count;
-        if !has_seen_dying {
-            faces.rim[count + 1] = other;
-            faces.rim[count + 2] = around[0];
-            faces.count += 2;
+    let [v_moves, w_moves] = [v, w].map(|end| geometry.position(end) != position);
+    if v_moves {
+        faces.of(v, w);
+        let count = faces.gather(disks, 0, y);
+        faces.gather_dying(count, x);
+        faces.look()?;
+    }
+    if w_moves {
+        faces.of(w, v);
+        let count = faces.gather(disks, 1, x);
+        if !v_moves {
+            faces.gather_dying(count, y);
         }
         faces.look()?;
-        has_seen_dying = true;
     }
     Some(faces.farthest())
 }
@@ -131,6 +128,25 @@ impl<'a> Faces<'a> {
     #[inline(always)]
     fn of(&mut self, end: VertexId, other: VertexId) {
         (self.point, self.other) = (self.geometry.position(end), other);
+    }
+
+    /// The faces around an end of an edge between disks but those that go, up to the apex before the
+    /// edge; how many.
+    #[inline(always)]
+    fn gather(&mut self, disks: &Disks, end: usize, last: VertexId) -> usize {
+        let (around, count) = disks.around_and_rest(end);
+        self.rim[..around.len()].copy_from_slice(around);
+        self.rim[count] = last;
+        self.count = count;
+        count
+    }
+
+    /// And the two behind so many that go.
+    #[inline(always)]
+    fn gather_dying(&mut self, count: usize, first: VertexId) {
+        self.rim[count + 1] = self.other;
+        self.rim[count + 2] = first;
+        self.count = count + 2;
     }
 
     /// The next vertex on the rim, and so a face. Nothing where one before it turns.
@@ -208,6 +224,7 @@ fn distance_squared(a: &[f32x4; 3], b: &[f32x4; 3], goes: f32x4, offset: Vec3) -
     let turns = dot(&normal, &after).simd_le(f32x4::ZERO)
         | is_thin(dot(&after, &after), &a_after, &b_after);
     let turns = turns & goes.simd_eq(f32x4::ZERO);
-    let is_turned = turns.any() && (turns & !is_thin(area_squared, a, b)).any();
+    // Both asked of all: whether a lane behind the last face turns, no branch would foresee.
+    let is_turned = (turns & !is_thin(area_squared, a, b)).any();
     (!is_turned).then_some(squared)
 }

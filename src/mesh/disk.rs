@@ -59,10 +59,21 @@ impl Disks {
     }
 
     /// The edges that leave the vertex that a [collapse](Mesh::collapse_between) leaves, in the order of
-    /// its fan: those of the tail, then those of the head.
+    /// its fan: those of the tail, then those of the head. The first of either became one with another.
     #[inline(always)]
-    pub fn spokes(&self) -> [&[EdgeId]; 2] {
-        [0, 1].map(|end| &self.leaving[end][..self.counts[end].min(FEW)])
+    pub fn spokes(&self) -> SmallVec<[EdgeId; 2 * FEW]> {
+        let [of_tail, of_head] = self.counts.map(|count| count.min(FEW));
+        let mut spokes = [self.sides[0]; 2 * FEW];
+        // Copied whole, which takes no loop.
+        spokes[..FEW].copy_from_slice(&self.leaving[0]);
+        spokes[of_tail..][..FEW].copy_from_slice(&self.leaving[1]);
+        SmallVec::from_buf_and_len(spokes, of_tail + of_head)
+    }
+
+    /// How many of the [spokes](Self::spokes) are the tail's.
+    #[inline(always)]
+    pub fn spokes_of_tail(&self) -> usize {
+        self.counts[0].min(FEW)
     }
 
     /// The [link condition](Mesh::link_condition).
@@ -100,22 +111,25 @@ impl<S: EdgeStore> Mesh<S> {
         let (mut count_u, mut count_v) = (0, 0);
         let [leaving_u, leaving_v] = &mut disks.leaving;
         let [around_u, around_v] = &mut disks.around;
-        // Both ways at once: each step waits for the one before it, but not for the other way's.
-        while at_u != end_u && at_v != end_v {
+        // Both ways at once: each step waits for the one before it, but not for the other way's. The one
+        // that is through goes in circles, so that there is but one end to foresee.
+        loop {
+            let (goes_on_u, goes_on_v) = (at_u != end_u, at_v != end_v);
+            if !(goes_on_u | goes_on_v) {
+                break;
+            }
             (*leaving_u.get_mut(count_u)?, around_u[count_u]) = (at_u, self.head(at_u));
             (*leaving_v.get_mut(count_v)?, around_v[count_v]) = (at_v, self.head(at_v));
-            (count_u, count_v) = (count_u + 1, count_v + 1);
-            (at_u, at_v) = (self.step(at_u)?, self.step(at_v)?);
+            let (next_u, next_v) = (self.step(at_u)?, self.step(at_v)?);
+            at_u = if goes_on_u { next_u } else { at_u };
+            at_v = if goes_on_v { next_v } else { at_v };
+            count_u += usize::from(goes_on_u);
+            count_v += usize::from(goes_on_v);
         }
-        while at_u != end_u {
-            (*leaving_u.get_mut(count_u)?, around_u[count_u]) = (at_u, self.head(at_u));
-            count_u += 1;
-            at_u = self.step(at_u)?;
-        }
-        while at_v != end_v {
-            (*leaving_v.get_mut(count_v)?, around_v[count_v]) = (at_v, self.head(at_v));
-            count_v += 1;
-            at_v = self.step(at_v)?;
+        for (around, count, end) in [(around_u, count_u, u), (around_v, count_v, v)] {
+            if let Some(beyond) = around.get_mut(count) {
+                *beyond = end;
+            }
         }
         disks.counts = [count_u, count_v];
         // Two faces on each other have nothing else around them.
