@@ -115,7 +115,10 @@ impl<S: EdgeStore> Mesh<S> {
         // that is through goes in circles, so that there is but one end to foresee.
         loop {
             let (goes_on_u, goes_on_v) = (at_u != end_u, at_v != end_v);
-            if !(goes_on_u | goes_on_v) {
+            // Added, since the compiler makes two branches of an or.
+            let [way_u, way_v] =
+                [(at_u, end_u), (at_v, end_v)].map(|(at, end)| at.index() ^ end.index());
+            if way_u + way_v == 0 {
                 break;
             }
             (*leaving_u.get_mut(count_u)?, around_u[count_u]) = (at_u, self.head(at_u));
