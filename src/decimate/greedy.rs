@@ -134,7 +134,7 @@ pub struct Greedy<S, C, Q> {
     changed: Vec<VertexId>,
     /// The edges to evaluate after a collapse; kept for its memory.
     edges: Vec<EdgeId>,
-    /// And their candidates.
+    /// The candidates that are about to be queued; kept for its memory.
     found: Vec<Candidate>,
     /// The edges that were popped and are to be evaluated.
     pending: Vec<EdgeId>,

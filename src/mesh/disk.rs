@@ -70,12 +70,6 @@ impl Disks {
         SmallVec::from_buf_and_len(spokes, of_tail + of_head)
     }
 
-    /// How many of the [spokes](Self::spokes) are the tail's.
-    #[inline(always)]
-    pub fn spokes_of_tail(&self) -> usize {
-        self.counts[0].min(FEW)
-    }
-
     /// The [link condition](Mesh::link_condition).
     #[inline(always)]
     pub fn link_condition(&self) -> bool {
