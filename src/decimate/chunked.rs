@@ -714,7 +714,7 @@ fn singular<S: EdgeStore>(surface: &Surface<S>, vertices: &[u32]) -> Singular {
         if surface.is_rim(e) {
             let [a, b] = mesh.edge_vertices(e).map(|v| vertices[v.index()]);
             singular.rim.push(RimEdge::between(a, b));
-        } else if !mesh.is_boundary(e) && mesh.canonical(e) == e {
+        } else if !mesh.is_boundary(e) && mesh.is_canonical(e) {
             singular.non_manifold_edges += 1;
             singular.conflicts += usize::from(mesh.edge_star(e).len() == 2);
         }

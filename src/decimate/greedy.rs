@@ -134,8 +134,6 @@ pub struct Greedy<S, C, Q> {
     changed: Vec<VertexId>,
     /// The edges to evaluate after a collapse; kept for its memory.
     edges: Vec<EdgeId>,
-    /// The candidates that are about to be queued; kept for its memory.
-    found: Vec<Candidate>,
     /// The edges that were popped and are to be evaluated.
     pending: Vec<EdgeId>,
     /// What they cost, as it was.
@@ -169,7 +167,6 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             changed_at: vec![0; surface.mesh.vertex_slots()],
             changed: Vec::new(),
             edges: Vec::new(),
-            found: Vec::new(),
             pending: Vec::with_capacity(LANES),
             pending_cost: 0.0,
             triangles: surface.triangles(),
@@ -227,13 +224,12 @@ impl<S: EdgeStore, C: Cost<S>, Q: Queue> Greedy<S, C, Q> {
             found.for_each(|candidate| queue.push(candidate, Age::UpToDate));
         };
         if slots <= BLOCK_FACES {
-            let mut found = std::mem::take(&mut self.found);
+            let mut found = Vec::with_capacity(2 * PART_FACES);
             for first in (0..slots).step_by(PART_FACES) {
                 evaluate(self, first, &mut found);
                 queue(&mut self.queue, &mut found);
                 meter.work(EVALUATION * PART_FACES)?;
             }
-            self.found = found;
             return Ok(is_any);
         }
         // In blocks, so that no second copy of all candidates is held.

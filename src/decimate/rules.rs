@@ -72,15 +72,15 @@ pub fn distance_from_disks(geometry: &Geometry, disks: &Disks, position: Vec3) -
     let [v_moves, w_moves] = [v, w].map(|end| geometry.position(end) != position);
     if v_moves {
         faces.of(v, w);
-        let count = faces.gather(disks, 0, y);
-        faces.gather_dying(count, x);
+        faces.gather(disks, 0, y);
+        faces.gather_dying(x);
         faces.look()?;
     }
     if w_moves {
         faces.of(w, v);
-        let count = faces.gather(disks, 1, x);
+        faces.gather(disks, 1, x);
         if !v_moves {
-            faces.gather_dying(count, y);
+            faces.gather_dying(y);
         }
         faces.look()?;
     }
@@ -131,22 +131,21 @@ impl<'a> Faces<'a> {
     }
 
     /// The faces around an end of an edge between disks but those that go, up to the apex before the
-    /// edge; how many.
+    /// edge.
     #[inline(always)]
-    fn gather(&mut self, disks: &Disks, end: usize, last: VertexId) -> usize {
-        let (around, count) = disks.around_and_rest(end);
+    fn gather(&mut self, disks: &Disks, end: usize, last: VertexId) {
+        let (around, count) = disks.around(end);
         self.rim[..around.len()].copy_from_slice(around);
         self.rim[count] = last;
         self.count = count;
-        count
     }
 
-    /// And the two behind so many that go.
+    /// And the two behind those that go.
     #[inline(always)]
-    fn gather_dying(&mut self, count: usize, first: VertexId) {
-        self.rim[count + 1] = self.other;
-        self.rim[count + 2] = first;
-        self.count = count + 2;
+    fn gather_dying(&mut self, first: VertexId) {
+        self.rim[self.count + 1] = self.other;
+        self.rim[self.count + 2] = first;
+        self.count += 2;
     }
 
     /// The next vertex on the rim, and so a face. Nothing where one before it turns.

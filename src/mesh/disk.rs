@@ -40,15 +40,9 @@ impl Disks {
     }
 
     /// The vertices around the tail (0) or the head (1), in the order of the walk, without the other
-    /// end and the apex before it.
+    /// end and the apex before it, and how many they are; places left over name the end itself.
     #[inline(always)]
-    pub fn around(&self, end: usize) -> &[VertexId] {
-        &self.around[end][..self.counts[end].min(FEW)]
-    }
-
-    /// [`around`](Self::around), with places left over behind as many as this says.
-    #[inline(always)]
-    pub fn around_and_rest(&self, end: usize) -> (&[VertexId; FEW], usize) {
+    pub fn around(&self, end: usize) -> (&[VertexId; FEW], usize) {
         (&self.around[end], self.counts[end].min(FEW))
     }
 
@@ -59,7 +53,7 @@ impl Disks {
     }
 
     /// The edges that leave the vertex that a [collapse](Mesh::collapse_between) leaves, in the order of
-    /// its fan: those of the tail, then those of the head. The first of either became one with another.
+    /// its fan: those of the tail, then those of the head.
     #[inline(always)]
     pub fn spokes(&self) -> SmallVec<[EdgeId; 2 * FEW]> {
         let [of_tail, of_head] = self.counts.map(|count| count.min(FEW));
@@ -73,10 +67,11 @@ impl Disks {
     /// The [link condition](Mesh::link_condition).
     #[inline(always)]
     pub fn link_condition(&self) -> bool {
-        let [around_u, _] = &self.around;
+        let ((around_u, _), (around_v, count_v)) = (self.around(0), self.around(1));
         let is_around_u = |z| around_u.iter().fold(false, |any, &x| any | (x == z));
-        let around_v = self.around(1).iter();
-        let is_common = around_v.fold(false, |any, &z| any | is_around_u(z));
+        let is_common = around_v[..count_v]
+            .iter()
+            .fold(false, |any, &z| any | is_around_u(z));
         let is_tetrahedron = self.counts[0].max(self.counts[1]) == 1;
         !is_common && !is_tetrahedron
     }

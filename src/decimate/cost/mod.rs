@@ -150,7 +150,7 @@ fn singular_weight<S: EdgeStore>(mesh: &Mesh<S>, e: EdgeId, boundary_weight: f64
     match mesh.opposite(e) {
         Opposite::Edge(_) => None,
         Opposite::Boundary => Some(boundary_weight),
-        Opposite::NonManifold(_) => (mesh.canonical(e) == e).then_some(BOUNDARY_WEIGHT),
+        Opposite::NonManifold(_) => mesh.is_canonical(e).then_some(BOUNDARY_WEIGHT),
     }
 }
 
